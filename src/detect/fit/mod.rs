@@ -33,5 +33,5 @@ pub(crate) use normal::{CholeskyFactor, NormalEquations};
 pub(crate) use parameters::{
     Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,
 };
-pub(crate) use sums::{BLOCK, Block, WindowPixels, products_of, sum_of};
+pub(crate) use sums::{BLOCK, Block, WindowPixels, products_in_lanes, sum_of};
 pub(crate) use window::{Window, window_radius};

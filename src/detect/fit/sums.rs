@@ -179,7 +179,7 @@ impl SumBuffers {
                 add_products(
                     normal,
                     [i, j],
-                    products_of([block, other], count, count),
+                    products_of([block, other]),
                     spots.len(),
                     pixels,
                 );
@@ -281,14 +281,30 @@ fn add_products<const N: usize>(
     }
 }
 
-/// The sums of the products of each image of a block with each of another, over the first `count`
-/// groups of each `width`.
+/// The sums of the products of each image of a block with each of another.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn products_of(
+fn products_of(blocks: [&[Block]; 2]) -> [[f64; BLOCK]; BLOCK] {
+    let sums = products_in_lanes(blocks, usize::MAX, usize::MAX);
+    let mut products = [[0.0; BLOCK]; BLOCK];
+    // Loops, as what `map` calls is not compiled for the processor.
+    for (products, sums) in products.iter_mut().zip(sums) {
+        for (product, sum) in products.iter_mut().zip(sums) {
+            *product = sum_of(sum);
+        }
+    }
+    products
+}
+
+/// The sums of the products of each image of a block with each of another, over the first `count`
+/// groups of each `width`, lane by lane.
+///
+/// Part of the loop over the blocks.
+#[inline(always)]
+pub(crate) fn products_in_lanes(
     [first, second]: [&[Block]; 2],
     count: usize,
     width: usize,
-) -> [[f64; BLOCK]; BLOCK] {
+) -> [[PixelGroup; BLOCK]; BLOCK] {
     let mut sums = [[[0.0f32; GROUP_PX]; BLOCK]; BLOCK];
     let width = width.max(1);
     for (first, second) in first.chunks(width).zip(second.chunks(width)) {
@@ -304,14 +320,7 @@ pub(crate) fn products_of(
             }
         }
     }
-    let mut products = [[0.0; BLOCK]; BLOCK];
-    // Loops, as what `map` calls is not compiled for the processor.
-    for (products, sums) in products.iter_mut().zip(sums) {
-        for (product, sum) in products.iter_mut().zip(sums) {
-            *product = sum_of(sum);
-        }
-    }
-    products
+    sums
 }
 
 /// The variance of the flux of one spot, in ADU², fitted together with a background of variance

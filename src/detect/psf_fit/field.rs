@@ -2,6 +2,7 @@
 
 use super::stars::PsfStar;
 use crate::detect::psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
+use arrayvec::ArrayVec;
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// Scatter of the stars' own moments beyond their errors: their colors, their neighbors.
@@ -10,26 +11,23 @@ const SCATTER: f64 = 0.02;
 /// hundred values.
 const CHI2_PER_PARAMETER: f64 = 5.0;
 
-/// Coefficients of the moments that one parameter multiplies.
-type Basis = [[f64; FIELD_TERMS]; 3];
 /// The moments of one star.
 type Moments = SVector<f64, 3>;
 
 /// One number of a basis: moment, term, coefficient.
 type Part = (usize, usize, f64);
-
-/// The basis with these parts.
-fn basis(parts: &[Part]) -> Basis {
-    let mut basis = [[0.0; FIELD_TERMS]; 3];
-    for &(moment, term, coefficient) in parts {
-        basis[moment][term] = coefficient;
-    }
-    basis
-}
+/// Most of them.
+const MAX_PARTS: usize = 3;
+/// Coefficients of the moments that one parameter multiplies, those that are not 0.
+type Basis = ArrayVec<Part, MAX_PARTS>;
+/// Coefficients of all moments.
+type Coefficients = [[f64; FIELD_TERMS]; 3];
+/// Most parameters of a model.
+const MAX_PARAMETERS: usize = 3 * FIELD_TERMS;
 
 /// The same term of each of the moments.
 fn of_each_moment(term: usize) -> impl Iterator<Item = Basis> {
-    (0..3).map(move |moment| basis(&[(moment, term, 1.0)]))
+    (0..3).map(move |moment| Basis::from_iter([(moment, term, 1.0)]))
 }
 
 /// Curvature of the field and astigmatism of a centred lens, of which the first term is `xx`: a
@@ -37,8 +35,8 @@ fn of_each_moment(term: usize) -> impl Iterator<Item = Basis> {
 fn centred(xx: usize) -> [Basis; 2] {
     let [xy, yy] = [xx + 1, xx + 2];
     [
-        basis(&[(0, xx, 1.0), (0, yy, 1.0)]),
-        basis(&[(1, xx, 1.0), (1, yy, -1.0), (2, xy, 2.0)]),
+        Basis::from_iter([(0, xx, 1.0), (0, yy, 1.0)]),
+        Basis::from_iter([(1, xx, 1.0), (1, yy, -1.0), (2, xy, 2.0)]),
     ]
 }
 
@@ -57,6 +55,9 @@ fn models() -> [Vec<Basis>; 7] {
     ]
 }
 
+/// Numbers of bases, and their values.
+type BasisValues = ArrayVec<(usize, f64), MAX_PARAMETERS>;
+
 /// The moments of one star, their variances, and the terms at its place.
 struct Sample {
     values: Moments,
@@ -73,8 +74,26 @@ impl Sample {
         }
     }
 
+    /// The values, moment by moment, of the bases that each depends on, and their numbers: most bases
+    /// are of one moment.
+    fn rows(&self, model: &[Basis]) -> [BasisValues; 3] {
+        let mut rows = [(); 3].map(|()| BasisValues::new());
+        for (number, basis) in model.iter().enumerate() {
+            let mut values = [0.0; 3];
+            for &(moment, term, coefficient) in basis {
+                values[moment] += coefficient * self.terms[term];
+            }
+            for (row, value) in rows.iter_mut().zip(values) {
+                if value != 0.0 {
+                    row.push((number, value));
+                }
+            }
+        }
+        rows
+    }
+
     /// The moments that coefficients give.
-    fn predicted(&self, coefficients: &Basis) -> Moments {
+    fn predicted(&self, coefficients: &Coefficients) -> Moments {
         Moments::from(polynomials(coefficients, &self.terms))
     }
 }
@@ -120,7 +139,7 @@ pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (Field
 
 /// Coefficients that fit the stars.
 struct FieldFit {
-    coefficients: Basis,
+    coefficients: Coefficients,
     chi2: f64,
 }
 
@@ -140,18 +159,7 @@ impl FieldFit {
             coefficients: [[0.0; FIELD_TERMS]; 3],
             chi2: 0.0,
         };
-        // The values at each star, moment by moment, of the bases that it depends on: most are of one
-        // moment.
-        let rows: Vec<[Vec<(usize, f64)>; 3]> = samples
-            .iter()
-            .map(|sample| {
-                let values: Vec<Moments> = model.iter().map(|b| sample.predicted(b)).collect();
-                std::array::from_fn(|moment| {
-                    let of_moment = values.iter().map(|value| value[moment]).enumerate();
-                    of_moment.filter(|(_, value)| *value != 0.0).collect()
-                })
-            })
-            .collect();
+        let rows: Vec<[BasisValues; 3]> = samples.iter().map(|s| s.rows(model)).collect();
         for _ in 0..ROUNDS {
             let mut matrix = DMatrix::<f64>::identity(model.len(), model.len()) * 1e-6;
             let mut right = DVector::<f64>::zeros(model.len());
@@ -171,9 +179,8 @@ impl FieldFit {
             let solution = matrix.cholesky()?.solve(&right);
             fit.coefficients = [[0.0; FIELD_TERMS]; 3];
             for (basis, factor) in model.iter().zip(solution.iter()) {
-                let numbers = fit.coefficients.as_flattened_mut().iter_mut();
-                for (sum, part) in numbers.zip(basis.as_flattened()) {
-                    *sum += factor * part;
+                for &(moment, term, coefficient) in basis {
+                    fit.coefficients[moment][term] += factor * coefficient;
                 }
             }
             fit.chi2 = 0.0;

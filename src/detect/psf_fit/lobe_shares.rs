@@ -2,13 +2,14 @@
 
 use super::stars::{PsfStar, StarFitter};
 use crate::base::size::Size;
-use crate::detect::fit::{BLOCK, Block, products_of};
+use crate::detect::fit::{BLOCK, Block, products_in_lanes, sum_of};
 use crate::detect::psf::{
     EffectivePsf, FieldForm, FieldLobe, GROUP_PX, LitPart, Lobe, LocalPsf, NarrowProfiles,
     PixelGroup, SpotMoments, covariance, each_of, inverse, plus,
 };
 use multiversion::multiversion;
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Standard deviation of a lobe over that of the spot along its shorter axis.
 const LOBE_SIZE: f64 = 0.55;
@@ -148,14 +149,15 @@ impl LobeGrid {
     /// that changes over the field as `psf` does.
     ///
     /// `classes`: lobes of the same number always have the same share.
-    fn sums(
+    fn sums<'s>(
         &self,
         psf: &EffectivePsf,
-        stars: &[PsfStar],
+        stars: impl IntoIterator<Item = &'s PsfStar>,
         classes: &[usize],
         fitter: &mut StarFitter,
     ) -> [LobeSums; 2] {
-        let mut of_halves = [0; 2].map(|_| LobeSums::new(psf.form, classes));
+        let classes = ImageClasses::of(classes);
+        let mut of_halves = [(); 2].map(|()| LaneSums::new(psf.form, &classes));
         let mut images = LobeImages::default();
         let mut local = LocalPsf::default();
         let every_lobe = self.lobes.iter().map(|&lobe| FieldLobe {
@@ -167,22 +169,22 @@ impl LobeGrid {
             ..psf.clone()
         };
         fitter.tabulate(psf);
-        for (number, star) in stars.iter().enumerate() {
+        for (number, star) in stars.into_iter().enumerate() {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
             fitter.weigh(star, psf, &mut images.roots, &mut images.values);
             all.place_lobes(x_px, y_px, &mut local);
-            images.draw(star, &local, &of_halves[0].images);
+            images.draw(star, &local, &classes);
             let outward = psf.moments.frame.distance(x_px, y_px);
             of_halves[number % 2].add(&images, outward);
         }
-        of_halves
+        of_halves.map(|sums| LobeSums::of(sums, classes.clone()))
     }
 
     /// [`Self::sums`] for solutions of the form of `psf` alone.
-    pub fn sums_of_form(
+    pub fn sums_of_form<'s>(
         &self,
         psf: &EffectivePsf,
-        stars: &[PsfStar],
+        stars: impl IntoIterator<Item = &'s PsfStar>,
         fitter: &mut StarFitter,
     ) -> [LobeSums; 2] {
         let all = self.classes(psf.form);
@@ -204,11 +206,22 @@ impl LobeGrid {
         self.sums(psf, stars, &self.classes(FieldForm::Fixed), fitter)
     }
 
-    /// The lobes that fit best.
-    pub fn solve(&self, sums: &LobeSums, form: FieldForm) -> Vec<FieldLobe> {
-        let shares = sums.solve(&self.expected_shares(), &self.classes(form));
+    /// The shares that fit best: of the centre, and where the PSF changes of the corners. The search
+    /// begins with `near` ones where there are any.
+    pub fn shares(&self, sums: &LobeSums, form: FieldForm, near: Option<&[f64]>) -> Vec<f64> {
+        let expected = self.expected_shares();
+        sums.solve(&expected, near, &self.classes(form))
+    }
+
+    /// The lobes that have light, with these [`Self::shares`].
+    pub fn lobes_of(&self, shares: &[f64]) -> Vec<FieldLobe> {
         let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
         self.with_shares(&[&shares[..self.lobes.len()], corner])
+    }
+
+    /// The lobes that fit best.
+    pub fn solve(&self, sums: &LobeSums, form: FieldForm) -> Vec<FieldLobe> {
+        self.lobes_of(&self.shares(sums, form, None))
     }
 }
 
@@ -261,9 +274,8 @@ struct LobeImages {
     lit: Vec<[[usize; 2]; 2]>,
     /// Groups in a row.
     width: usize,
-    /// The pixels above the background, times the square roots of their weights: the first image of
-    /// a block.
-    values: Vec<Block>,
+    /// The pixels above the background, times the square roots of their weights.
+    values: Vec<PixelGroup>,
     /// Square roots of the weights.
     roots: Vec<PixelGroup>,
     profiles: NarrowProfiles,
@@ -293,22 +305,22 @@ impl LobeImages {
         );
     }
 
-    /// The sums over all pixels of the products of each image of a block with each of another; `None`
-    /// where no pixel has light of both.
-    fn products(&self, blocks: [usize; 2]) -> Option<[[f64; BLOCK]; BLOCK]> {
+    /// The groups in which both of two blocks have light, the first of them in a row and the one after
+    /// the last, and the rows; `None` where there are none.
+    fn lit_by_both(&self, blocks: [usize; 2]) -> Option<[[usize; 2]; 2]> {
         let [a, b] = blocks.map(|block| self.lit[block]);
-        let [[first_row, end_row], [first, end]] = [0, 1].map(|axis| {
-            let [[a, b], [c, d]] = [a[axis], b[axis]];
-            [a.max(c), b.min(d)]
-        });
-        if first_row >= end_row || first >= end {
-            return None;
-        }
-        let of_blocks = blocks.map(|block| {
-            let of_block = &self.light[block * self.values.len()..];
-            &of_block[first_row * self.width + first..(end_row - 1) * self.width + end]
-        });
-        Some(products_of(of_blocks, end - first, self.width))
+        let both = [0, 1].map(|axis| [a[axis][0].max(b[axis][0]), a[axis][1].min(b[axis][1])]);
+        both.iter().all(|[first, end]| first < end).then_some(both)
+    }
+
+    /// Where the groups of this part of a window are.
+    fn span(&self, [[first_row, end_row], [first, end]]: [[usize; 2]; 2]) -> Range<usize> {
+        first_row * self.width + first..(end_row - 1) * self.width + end
+    }
+
+    /// The light of the images of a block.
+    fn block(&self, block: usize) -> &[Block] {
+        &self.light[block * self.values.len()..][..self.values.len()]
     }
 }
 
@@ -367,6 +379,101 @@ fn add_weighted_lobe(
     }
 }
 
+/// Sums of the products of two blocks, lane by lane: to add the lanes of each star would take longer
+/// than the products.
+type BlockProducts = [[PixelGroup; BLOCK]; BLOCK];
+
+/// [`LobeSums`] lane by lane, while stars are added.
+#[derive(Debug)]
+struct LaneSums {
+    /// For each of the parts that two shares have: of blocks i ≤ j, those with j = 0, with 1, …
+    products: Vec<Vec<BlockProducts>>,
+    /// For each set of shares, block by block.
+    right: Vec<Vec<Block>>,
+}
+
+impl LaneSums {
+    fn new(form: FieldForm, classes: &ImageClasses) -> Self {
+        let sets = match form {
+            FieldForm::Symmetric | FieldForm::Fixed => 1,
+            FieldForm::Radial => 2,
+        };
+        let blocks = classes.padded_count() / BLOCK;
+        let empty = [[0.0; GROUP_PX]; BLOCK];
+        Self {
+            products: vec![vec![[empty; BLOCK]; blocks * (blocks + 1) / 2]; 2 * sets - 1],
+            right: vec![vec![empty; blocks]; sets],
+        }
+    }
+
+    /// Adds the pixels of a star.
+    fn add(&mut self, images: &LobeImages, outward: f64) {
+        let (inward, outward) = ((1.0 - outward) as f32, outward as f32);
+        match self.right.len() {
+            1 => add_products(images, &[1.0], &mut self.products),
+            _ => {
+                let parts = [inward * inward, inward * outward, outward * outward];
+                add_products(images, &parts, &mut self.products);
+            }
+        }
+        let parts: &[f32] = match self.right.len() {
+            1 => &[1.0],
+            _ => &[inward, outward],
+        };
+        add_values(images, parts, &mut self.right);
+    }
+}
+
+/// Adds these parts of the products of all images to each of the sums.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_products(images: &LobeImages, parts: &[f32], sums: &mut [Vec<BlockProducts>]) {
+    let mut pair = 0;
+    for column in 0..images.lit.len() {
+        for row in 0..=column {
+            if let Some(lit) = images.lit_by_both([row, column]) {
+                let span = images.span(lit);
+                let blocks = [
+                    &images.block(row)[span.clone()],
+                    &images.block(column)[span],
+                ];
+                let [first, end] = lit[1];
+                let products = products_in_lanes(blocks, end - first, images.width);
+                for (sums, part) in sums.iter_mut().zip(parts) {
+                    let of_rows = sums[pair].as_flattened_mut().iter_mut();
+                    for (sum, product) in of_rows.zip(products.as_flattened()) {
+                        for (sum, product) in sum.iter_mut().zip(product) {
+                            *sum += part * product;
+                        }
+                    }
+                }
+            }
+            pair += 1;
+        }
+    }
+}
+
+/// Adds these parts of the products of all images and the values to each of the sums.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_values(images: &LobeImages, parts: &[f32], sums: &mut [Vec<Block>]) {
+    for block in 0..images.lit.len() {
+        let mut products = [[0.0f32; GROUP_PX]; BLOCK];
+        for (light, values) in images.block(block).iter().zip(&images.values) {
+            for (product, light) in products.iter_mut().zip(light) {
+                for lane in 0..GROUP_PX {
+                    product[lane] += light[lane] * values[lane];
+                }
+            }
+        }
+        for (sums, part) in sums.iter_mut().zip(parts) {
+            for (sum, product) in sums[block].iter_mut().zip(&products) {
+                for (sum, product) in sum.iter_mut().zip(product) {
+                    *sum += part * product;
+                }
+            }
+        }
+    }
+}
+
 /// Normal equations of the shares: of the centre, and where the PSF changes of the corners.
 #[derive(Debug, Clone)]
 pub(super) struct LobeSums {
@@ -379,21 +486,32 @@ pub(super) struct LobeSums {
 }
 
 impl LobeSums {
-    fn new(form: FieldForm, classes: &[usize]) -> Self {
-        let sets = match form {
-            FieldForm::Symmetric | FieldForm::Fixed => 1,
-            FieldForm::Radial => 2,
-        };
-        let images = ImageClasses::of(classes);
+    /// Adds the lanes.
+    fn of(sums: LaneSums, images: ImageClasses) -> Self {
         let count = images.padded_count();
+        let matrix = |products: Vec<BlockProducts>| {
+            let mut matrix = DMatrix::zeros(count, count);
+            let mut products = products.into_iter();
+            for column in 0..count / BLOCK {
+                for (row, products) in products.by_ref().take(column + 1).enumerate() {
+                    for (i, products) in products.iter().enumerate() {
+                        for (j, product) in products.iter().enumerate() {
+                            matrix[(row * BLOCK + i, column * BLOCK + j)] = sum_of(*product);
+                        }
+                    }
+                }
+            }
+            matrix
+        };
+        let values = |blocks: Vec<Block>| blocks.into_iter().flatten().map(sum_of).collect();
         Self {
             images,
-            products: vec![DMatrix::zeros(count, count); 2 * sets - 1],
-            right: vec![vec![0.0; count]; sets],
+            products: sums.products.into_iter().map(matrix).collect(),
+            right: sums.right.into_iter().map(values).collect(),
         }
     }
 
-    /// The sums over both halves.
+    /// The sums over both.
     pub fn plus(&self, other: &Self) -> Self {
         let mut sums = self.clone();
         for (sum, other) in sums.products.iter_mut().zip(&other.products) {
@@ -406,50 +524,10 @@ impl LobeSums {
         sums
     }
 
-    /// Adds the pixels of a star.
-    fn add(&mut self, images: &LobeImages, outward: f64) {
-        let inward = 1.0 - outward;
-        let (of_sets, of_products): (&[f64], &[f64]) = match self.right.len() {
-            1 => (&[1.0], &[1.0]),
-            _ => (
-                &[inward, outward],
-                &[inward * inward, inward * outward, outward * outward],
-            ),
-        };
-        let blocks = images.light.chunks_exact(images.values.len());
-        for (block, light) in blocks.enumerate() {
-            let count = light.len();
-            let products = products_of([light, &images.values], count, count);
-            for (number, [product, ..]) in products.iter().enumerate() {
-                for (right, part) in self.right.iter_mut().zip(of_sets) {
-                    right[block * BLOCK + number] += part * product;
-                }
-            }
-        }
-        for column in 0..images.lit.len() {
-            for row in 0..=column {
-                let Some(products) = images.products([column, row]) else {
-                    continue;
-                };
-                for (sums, part) in self.products.iter_mut().zip(of_products) {
-                    let columns = sums
-                        .as_mut_slice()
-                        .chunks_exact_mut(images.lit.len() * BLOCK);
-                    let columns = columns.skip(column * BLOCK);
-                    for (sums, products) in columns.zip(products) {
-                        let sums = sums[row * BLOCK..].iter_mut();
-                        for (sum, product) in sums.zip(products) {
-                            *sum += part * product;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    /// The non-negative shares of the lobes, by coordinate descent from those of `expected`, which
-    /// count as known to within a part of themselves. Shares of the same class are equal.
-    fn solve(&self, expected: &[f64], classes: &[usize]) -> Vec<f64> {
+    /// The non-negative shares of the lobes, by coordinate descent from `near` ones, or from those of
+    /// `expected`, which count as known to within a part of themselves. Shares of the same class are
+    /// equal.
+    fn solve(&self, expected: &[f64], near: Option<&[f64]>, classes: &[usize]) -> Vec<f64> {
         /// Uncertainty of what is expected: of the share, and of the largest share.
         const UNCERTAIN: [f64; 2] = [1.0, 0.5];
         let lobes = expected.len();
@@ -461,7 +539,7 @@ impl LobeSums {
         for (number, &class) in class_of.iter().enumerate() {
             let share = expected[number % lobes];
             let weight = (UNCERTAIN[0] * share + UNCERTAIN[1] * largest).powi(-2);
-            shares[class] = share;
+            shares[class] = near.map_or(share, |near| near[number]);
             matrix[(class, class)] += weight;
             right[class] += weight * share;
         }

@@ -19,14 +19,12 @@ use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
 use field::moments_over_field;
 use lobe_shares::{LobeGrid, LobeSums};
-use stars::{PsfStar, StarFitter};
+use stars::{PsfStar, STEPS, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.
 const MIN_STARS: usize = 5;
 /// Fewer do not tell how its form changes over the field.
 const MIN_STARS_OF_FIELD: usize = 12;
-/// Steps of the stars' fits in each round.
-const STEPS: usize = 2;
 /// A form is better than a simpler one where it lowers chi² by this.
 const BETTER_CHI2: f64 = 20.0;
 /// Spots are no round Gaussians from this elongation on, or where they change over the field,
@@ -58,8 +56,7 @@ pub(crate) fn measure_psf(
     let grid = LobeGrid::of(typical_moments(&stars));
     let settled = Settled::of(&grid, maps, &mut stars, &mut fitter);
     let best = best_of(&grid, &settled, &stars, &mut fitter);
-    let pixels = stars.len() * (2 * radius_px + 1).pow(2);
-    if best.chi2 >= MAX_CHI2 * pixels as f64 {
+    if are_unlike(best.total_chi2(), &stars) {
         return None;
     }
     // If the spots were round Gaussians of the frame's size.
@@ -75,6 +72,13 @@ pub(crate) fn measure_psf(
         model.noise = noise;
         best.psf
     })
+}
+
+/// Whether stars whose residuals have this chi² are not alike. Their windows are whole.
+fn are_unlike(chi2: f64, stars: &[PsfStar]) -> bool {
+    let area = |star: &PsfStar| star.window.width * star.window.height;
+    let pixels: usize = stars.iter().map(area).sum();
+    chi2 >= MAX_CHI2 * pixels as f64
 }
 
 /// A point-symmetric PSF with its moments over the field.
@@ -111,12 +115,10 @@ impl Settled {
             let [even, odd] = if is_last {
                 grid.sums_of_fixed(psf, stars, fitter)
             } else {
-                grid.sums_of_form(psf, stars, fitter)
+                grid.sums_of_form(psf, &*stars, fitter)
             };
             psf.lobes = grid.solve(&even.plus(&odd), psf.form);
-            for _ in 0..STEPS {
-                fitter.step(stars, psf, false);
-            }
+            fitter.place(stars, psf);
             [even, odd]
         };
         round(&mut psf, false);
@@ -134,8 +136,8 @@ struct Candidate {
     psf: EffectivePsf,
     /// For the stars of even numbers, from the odd ones, and the other way round.
     of_halves: [EffectivePsf; 2],
-    /// Of each half of the stars with the PSF of the other.
-    chi2: f64,
+    /// Of each star with the PSF of the other half.
+    chi2: Vec<f64>,
 }
 
 impl Candidate {
@@ -146,21 +148,39 @@ impl Candidate {
         stars: &[PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
-        let with = |sums: &LobeSums| EffectivePsf {
-            lobes: grid.solve(sums, psf.form),
+        let with = |shares: &[f64]| EffectivePsf {
+            lobes: grid.lobes_of(shares),
             ..psf.clone()
         };
-        let of_halves = [with(odd), with(even)];
-        let chi2 = of_halves.iter().enumerate().map(|(half, psf)| {
+        let shares = grid.shares(&even.plus(odd), psf.form, None);
+        // The halves are not far from the whole.
+        let of_half = |sums: &LobeSums| with(&grid.shares(sums, psf.form, Some(&shares)));
+        let of_halves = [of_half(odd), of_half(even)];
+        let mut chi2 = vec![0.0; stars.len()];
+        for (half, psf) in of_halves.iter().enumerate() {
             fitter.tabulate(psf);
-            let stars = stars.iter().skip(half).step_by(2);
-            stars.map(|star| fitter.chi2(star, psf)).sum::<f64>()
-        });
+            let of_half = stars.iter().zip(&mut chi2).skip(half).step_by(2);
+            of_half.for_each(|(star, chi2)| *chi2 = fitter.chi2(star, psf));
+        }
         Self {
-            chi2: chi2.sum(),
-            psf: with(&even.plus(odd)),
+            chi2,
+            psf: with(&shares),
             of_halves,
         }
+    }
+
+    /// This, or another one where that is clearly better.
+    fn or_better(self, other: Self) -> Self {
+        if other.total_chi2() < self.total_chi2() - BETTER_CHI2 {
+            other
+        } else {
+            self
+        }
+    }
+
+    /// Chi² of all stars.
+    fn total_chi2(&self) -> f64 {
+        self.chi2.iter().sum()
     }
 }
 
@@ -177,26 +197,50 @@ fn best_of(
         ..psf.clone()
     };
     let mut best = Candidate::of(grid, psf, sums, stars, fitter);
-    let mut consider = |other: Candidate| {
-        if other.chi2 < best.chi2 - BETTER_CHI2 {
-            best = other;
-        }
-    };
     let fixed = of_form(FieldForm::Fixed);
-    consider(Candidate::of(grid, &fixed, sums, stars, fitter));
-    if stars.len() >= MIN_STARS_OF_FIELD {
-        let mut stars = stars.to_vec();
-        let mut radial = of_form(FieldForm::Radial);
-        // The stars move to the centres of light of such spots.
-        let [even, odd] = grid.sums_of_form(&radial, &stars, fitter);
-        radial.lobes = grid.solve(&even.plus(&odd), radial.form);
-        for _ in 0..STEPS {
-            fitter.step(&mut stars, &radial, false);
-        }
-        let sums = grid.sums_of_form(&radial, &stars, fitter);
-        consider(Candidate::of(grid, &radial, &sums, &stars, fitter));
+    best = best.or_better(Candidate::of(grid, &fixed, sums, stars, fitter));
+    match of_radial(grid, of_form(FieldForm::Radial), stars, &best, fitter) {
+        Some(radial) => best.or_better(radial),
+        None => best,
     }
-    best
+}
+
+/// The PSF of [`FieldForm::Radial`]; `None` where too few stars tell, or a few of them that it is
+/// fitted to have no smaller chi² than with the `best` one, which is not fitted to them, or are not
+/// alike with either.
+fn of_radial(
+    grid: &LobeGrid,
+    mut psf: EffectivePsf,
+    stars: &[PsfStar],
+    best: &Candidate,
+    fitter: &mut StarFitter,
+) -> Option<Candidate> {
+    /// One of so many stars is tried first.
+    const TRIED: usize = 3;
+    if stars.len() < MIN_STARS_OF_FIELD {
+        return None;
+    }
+    let start = psf.clone();
+    let tried = || stars.iter().step_by(TRIED);
+    let [even, odd] = grid.sums_of_form(&start, tried(), fitter);
+    let of_tried = even.plus(&odd);
+    psf.lobes = grid.solve(&of_tried, psf.form);
+    // The stars move to the centres of light of such spots.
+    let mut moved: Vec<PsfStar> = tried().cloned().collect();
+    fitter.place(&mut moved, &psf);
+    let chi2: f64 = moved.iter().map(|star| fitter.chi2(star, &psf)).sum();
+    let of_best: f64 = best.chi2.iter().step_by(TRIED).sum();
+    let is_hopeless = are_unlike(best.total_chi2(), stars) && are_unlike(chi2, &moved);
+    if chi2 >= of_best || is_hopeless {
+        return None;
+    }
+    let others = stars.iter().enumerate().filter(|(i, _)| i % TRIED != 0);
+    let [even, odd] = grid.sums_of_form(&start, others.map(|(_, star)| star), fitter);
+    psf.lobes = grid.solve(&of_tried.plus(&even).plus(&odd), psf.form);
+    let mut stars = stars.to_vec();
+    fitter.place(&mut stars, &psf);
+    let sums = grid.sums_of_form(&psf, &stars, fitter);
+    Some(Candidate::of(grid, &psf, &sums, &stars, fitter))
 }
 
 /// Half of the side of the windows, in pixels.

@@ -4,8 +4,7 @@ use crate::base::size::Size;
 use crate::base::statistics::median;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{
-    BLOCK, Block, FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels,
-    sum_of,
+    FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels, sum_of,
 };
 use crate::detect::psf::{
     DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LIGHT_BY_PLACE, LitPart, Lobe,
@@ -21,6 +20,9 @@ const MIN_SNR: f32 = 15.0;
 /// Error of the PSF while it is measured, as a part of the light, squared: the brightest stars must
 /// not count for all.
 pub(super) const MODEL_ERROR2: f64 = 0.02 * 0.02;
+
+/// Steps of the stars' fits in each round.
+pub(super) const STEPS: usize = 2;
 
 /// Parameters of a star: x, y, flux, background; size and elongation.
 const PARAMETERS: usize = 7;
@@ -127,6 +129,13 @@ impl StarFitter {
         Some(std::array::from_fn(|i| change[PLACE + i]))
     }
 
+    /// Moves stars by some steps of their fits to `psf`, with their moments held.
+    pub fn place(&mut self, stars: &mut [PsfStar], psf: &EffectivePsf) {
+        for _ in 0..STEPS {
+            self.step(stars, psf, false);
+        }
+    }
+
     /// Chi² of a star a linear step of its fit to `psf` on.
     pub fn chi2(&mut self, star: &PsfStar, psf: &EffectivePsf) -> f64 {
         self.draw::<PLACE>(star, psf);
@@ -199,15 +208,14 @@ impl StarFitter {
         normal
     }
 
-    /// Square root of the weight, and as the first of a block the value above the background times
-    /// that root, of each pixel of a star with this PSF, in units of the noise. Those of pixels that
-    /// are left out are 0.
+    /// Square root of the weight, and the value above the background times that root, of each pixel
+    /// of a star with this PSF, in units of the noise. Those of pixels that are left out are 0.
     pub fn weigh(
         &mut self,
         star: &PsfStar,
         psf: &EffectivePsf,
         roots: &mut Vec<PixelGroup>,
-        values: &mut Vec<Block>,
+        values: &mut Vec<PixelGroup>,
     ) {
         self.draw::<PLACE>(star, psf);
         let pixels = WindowPixels::new(&star.window, star.background, &self.noise);
@@ -228,9 +236,7 @@ impl StarFitter {
                     of_group[lane] * above
                 }
             };
-            let mut block = [[0.0; GROUP_PX]; BLOCK];
-            block[0] = std::array::from_fn(value);
-            values.push(block);
+            values.push(std::array::from_fn(value));
             roots.push(of_group);
         }
     }

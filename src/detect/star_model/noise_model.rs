@@ -106,12 +106,13 @@ pub(crate) fn noise_of(
             noise: model,
         };
         for (window, spot) in stars.iter_mut() {
-            buffers.window.copy_from(window);
-            let fit = buffers.fitter.fit(window, &[*spot], &config);
+            mem::swap(&mut buffers.window, window);
+            let fit = buffers.fitter.fit(&buffers.window, &[*spot], &config);
             if fit.converged {
                 *spot = fit.spots[0];
                 sums.add_star(buffers, &fit, &config, None);
             }
+            mem::swap(&mut buffers.window, window);
         }
         model = sums.solve();
     }
