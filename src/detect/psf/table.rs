@@ -261,20 +261,32 @@ fn combine_rows<const PARTS: usize>(
     lines: &mut [Vec<f32>; 3],
 ) {
     let TableLayout { per_px, stride, .. } = table.layout;
+    // In whole groups, which rows have.
+    let first = first / GROUP_PX * GROUP_PX;
+    let end = end.next_multiple_of(GROUP_PX);
     for (number, (line, weights)) in lines.iter_mut().zip(weights).enumerate() {
         if PARTS == LIGHT && number == 1 {
             continue;
         }
         line.resize(per_px * stride, 0.0);
         for (phase, line) in line.chunks_exact_mut(stride).enumerate() {
-            let [a, b, c, d] = rows.map(|row| {
+            let of_rows = rows.map(|row| {
                 let start = table.layout.row([phase, 0], 0).wrapping_add_signed(row);
-                &table.coefficients[start + first..start + end]
+                let samples = &table.coefficients[start + first..start + end];
+                samples.as_chunks::<GROUP_PX>().0
             });
-            let line = &mut line[first..end];
+            let [a, b, c, d] = of_rows;
             let samples = a.iter().zip(b).zip(c.iter().zip(d));
-            for (sum, ((a, b), (c, d))) in line.iter_mut().zip(samples) {
-                *sum = weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
+            let line = line[first..end].as_chunks_mut::<GROUP_PX>().0.iter_mut();
+            for (sum, ((a, b), (c, d))) in line.zip(samples) {
+                let mut all = [0.0f32; GROUP_PX];
+                for lane in 0..GROUP_PX {
+                    all[lane] = weights[0] * a[lane]
+                        + weights[1] * b[lane]
+                        + weights[2] * c[lane]
+                        + weights[3] * d[lane];
+                }
+                *sum = all;
             }
         }
     }
