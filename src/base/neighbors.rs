@@ -112,10 +112,16 @@ impl PointGrid {
         mut visit: impl FnMut(Neighbor),
     ) {
         let columns = self.x.near(center.x, radius_px);
+        let enough_px2 = radius_px * radius_px * (1.0 + 4.0 * f64::EPSILON);
         for row in self.y.near(center.y, radius_px) {
             let [first, last] = [columns.start(), columns.end()].map(|c| row * self.x.parts + c);
             let near = self.starts[first] as usize..self.starts[last + 1] as usize;
             for &(point, index) in &self.by_cell[near] {
+                let (dx, dy) = (point.x - center.x, point.y - center.y);
+                // Most are farther away: no need for the exact distance.
+                if dx * dx + dy * dy > enough_px2 {
+                    continue;
+                }
                 let distance_px = point.distance_to(center);
                 if distance_px <= radius_px {
                     visit(Neighbor {

@@ -174,24 +174,27 @@ fn measure_cell(
         return None;
     }
     let is_sparse = at_lowest as f64 > MOSTLY_LOWEST * total as f64;
-    (total, at_lowest) = (0, 0);
+    let columns = columns.start.max(ASIDE_PX)..columns.end.min(view.width - ASIDE_PX);
+    let with_aside = columns.start - ASIDE_PX..columns.end + ASIDE_PX;
     above.clear();
+    above.resize(rows.len() * columns.len() + 1, 0.0);
+    let mut count = 0;
+    total = 0;
     for y in rows {
-        let row = view.row(y).as_floats(buffer);
-        for x in columns.start.max(ASIDE_PX)..columns.end.min(view.width - ASIDE_PX) {
-            let aside = [row[x - ASIDE_PX], row[x + ASIDE_PX]];
-            let value = row[x];
-            if value.is_nan() || (is_sparse && aside.iter().any(|&v| v > lowest)) {
-                continue;
-            }
-            total += 1;
-            if value > lowest {
-                above.push(value);
-            } else {
-                at_lowest += 1;
-            }
+        let row = view.row(y).span(with_aside.clone()).as_floats(buffer);
+        let after = |px: usize| row.get(px..).unwrap_or_default();
+        let pixels = row.iter().zip(after(ASIDE_PX)).zip(after(2 * ASIDE_PX));
+        // Without branches, which nobody can predict in noise.
+        for ((left, value), right) in pixels {
+            let is_beside_light = is_sparse & ((*left > lowest) | (*right > lowest));
+            let is_counted = !value.is_nan() & !is_beside_light;
+            total += usize::from(is_counted);
+            above[count] = *value;
+            count += usize::from(is_counted & (*value > lowest));
         }
     }
+    above.truncate(count);
+    at_lowest = total - count;
     if above.len() < MIN_ABOVE || at_lowest == 0 {
         return (above.len() < MIN_ABOVE).then_some(CutCell::Dark);
     }

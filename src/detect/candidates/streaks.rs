@@ -28,6 +28,8 @@ pub(super) struct Streaks {
     is_represented: Vec<bool>,
     /// Indices of the peaks.
     order: Vec<u32>,
+    /// Their columns and rows while they are in the order of the rows.
+    places: Vec<[f32; 2]>,
     /// Disjoint sets of peaks that are close to each other.
     parents: Vec<u32>,
     /// Number of peaks in each set, at its representative.
@@ -92,6 +94,7 @@ impl Streaks {
     fn link_peaks(&mut self, peaks: &[Peak], max_gap_px: f32) {
         let Self {
             order,
+            places,
             parents,
             sizes,
             ..
@@ -100,11 +103,15 @@ impl Streaks {
         order.extend(0..peaks.len() as u32);
         order.sort_unstable_by_key(|&i| (peaks[i as usize].y, i));
         disjoint_sets::reset(parents, peaks.len());
-        for (rank, &index) in order.iter().enumerate() {
-            let peak = &peaks[index as usize];
-            for &other in &order[rank + 1..] {
-                let dx = peaks[other as usize].x as f32 - peak.x as f32;
-                let dy = peaks[other as usize].y as f32 - peak.y as f32;
+        places.clear();
+        places.extend(order.iter().map(|&i| {
+            let peak = &peaks[i as usize];
+            [peak.x as f32, peak.y as f32]
+        }));
+        for (rank, (&index, [x, y])) in order.iter().zip(&*places).enumerate() {
+            let later = order[rank + 1..].iter().zip(&places[rank + 1..]);
+            for (&other, [other_x, other_y]) in later {
+                let (dx, dy) = (other_x - x, other_y - y);
                 if dy > max_gap_px {
                     break;
                 }
