@@ -27,7 +27,7 @@ fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame<'static>, Sta
     .ok()?;
     let field = star_field(&frame, &detections, 0.0);
     let identification = identify(&field, &Priors::default(), indexed).ok()?;
-    let scale_rad = 1.0 / identification.camera.focal_length_px;
+    let scale_rad = 1.0 / identification.camera.focal_length_px();
     let priors = Priors {
         scale: Some(ScalePrior::between(scale_rad / SQRT_2, scale_rad * SQRT_2)),
         ..Priors::default()

@@ -56,7 +56,9 @@ fn print_solution(solution: &Solution, catalog: &Catalog) {
     println!("  Dec {:.5}°", dec_rad.to_degrees());
     println!("  up at position angle {:.4}°", up_rad.to_degrees());
     println!("  errors about x, y and roll: {x:.2}″, {y:.2}″, {roll:.2}″");
-    println!("  field {:.3}° wide", found.camera.fov_x_rad().to_degrees());
+    if let Some(fov_x_rad) = found.camera.fov_x_rad() {
+        println!("  field {:.3}° wide", fov_x_rad.to_degrees());
+    }
     println!(
         "  chance of a wrong answer 10^{:.0}",
         found.log10_false_alarm

@@ -121,40 +121,49 @@ class Lens:
         self.focal_px = toml["focal_length_mm"] / pitch_mm
         self.size = np.array([toml["width_px"], toml["height_px"]])
         self.radius = np.hypot(*self.size) / 2
-        radial = ["distortion_px", "distortion5_px", "distortion7_px"]
-        self.radial = [toml.get(key, 0) for key in radial]
-        self.tilt = np.array([toml.get("tilt_x_px", 0), toml.get("tilt_y_px", 0)])
-        self.decentring = np.array([toml.get("decentring_x_px", 0), toml.get("decentring_y_px", 0)])
+        number = lambda key: toml.get(key, 0) / self.radius
+        self.radial = [number(key) for key in ("distortion_px", "distortion5_px", "distortion7_px")]
+        self.axis = self.radius * np.array([number("axis_x_px"), number("axis_y_px")])
+        self.decentring = np.array([number("decentring_x_px"), number("decentring_y_px")])
+        stretch, skew = number("stretch_px"), number("skew_px")
+        self.stretched = np.array([[1 + stretch, skew], [skew, 1 - stretch]])
         self.mirrored = toml.get("mirrored", False)
 
-    def ideal(self, observed):
-        """From observed to ideal: r (1 - a r^2 - b r^4 - c r^6) - (r^2 P + 2 (P.r) r) - (T.r) r.
-
-        P is a third of the decentring, T the tilt.
-        """
-        r = observed / self.radius
+    def observed(self, ideal):
+        """Offset from the frame's centre of an ideal offset from the axis, in pixels."""
+        r = ideal / self.radius
         square = np.sum(r * r, axis=-1, keepdims=True)
         third = self.decentring / 3
         along = (r @ third)[..., None]
-        radial = sum(term * square ** (i + 1) for i, term in enumerate(self.radial))
-        tilted = (r @ self.tilt)[..., None]
-        return observed - radial * r - (square * third + 2 * along * r) - tilted * r
+        radial = 1 + sum(term * square ** (i + 1) for i, term in enumerate(self.radial))
+        moved = radial * r + square * third + 2 * along * r
+        return self.radius * moved @ self.stretched + self.axis
+
+    def axes(self):
+        """Rows: camera axes in those of the lens. The camera looks where the frame's centre does."""
+        ideal = np.zeros(2)
+        step = 1e-3
+
+        def slope(at):
+            moved = [self.observed(at + step * a) - self.observed(at - step * a) for a in np.eye(2)]
+            return np.stack(moved, axis=-1) / (2 * step)
+
+        for _ in range(50):
+            ideal -= np.linalg.solve(slope(ideal), self.observed(ideal))
+        out = np.array([*ideal, self.focal_px])
+        out /= np.linalg.norm(out)
+        # What moves the image along x alone and along y alone, and the right angle nearest to both.
+        moves = np.vstack([np.linalg.inv(slope(ideal)), np.zeros(2)])
+        moves -= np.outer(out, out @ moves)
+        left, _, right = np.linalg.svd(moves, full_matrices=False)
+        return np.vstack([(left @ right).T, out])
 
     def pixels(self, directions):
-        """Pixels of unit vectors in camera axes; inverts the polynomial by Newton's method."""
+        """Pixels of unit vectors in camera axes."""
+        directions = directions @ self.axes()
         ideal = self.focal_px * directions[..., :2] / directions[..., 2:]
-        observed = ideal.copy()
-        for _ in range(30):
-            error = self.ideal(observed) - ideal
-            step = 1e-3
-            dx, dy = (
-                (self.ideal(observed + step * axis) - self.ideal(observed - step * axis)) / (2 * step)
-                for axis in np.eye(2)
-            )
-            jacobian = np.stack([dx, dy], axis=-1)
-            observed -= np.linalg.solve(jacobian, error[..., None])[..., 0]
         sign = np.array([-1 if self.mirrored else 1, 1])
-        return (self.size - 1) / 2 + sign * observed
+        return (self.size - 1) / 2 + sign * self.observed(ideal)
 
 
 def unit(ra_deg, dec_deg):
@@ -189,7 +198,8 @@ def positions(checks):
         (
             "all of it, at the north pole",
             {"distortion_px": 25.0, "decentring_x_px": 6.0, "decentring_y_px": -9.0}
-            | {"distortion5_px": -7.0, "distortion7_px": 5.0, "tilt_x_px": 3.0, "tilt_y_px": 4.0},
+            | {"distortion5_px": -7.0, "distortion7_px": 5.0, "axis_x_px": 30.0, "axis_y_px": -21.0}
+            | {"stretch_px": 5.0, "skew_px": -3.0},
             (120.0, 89.7, 75.0),
         ),
         (

@@ -25,7 +25,7 @@ from astropy.io import fits
 from astropy.wcs import WCS
 
 TOLERANCE_PX = 0.02
-ANGLE_TOLERANCE_DEG = 1e-5
+ANGLE_TOLERANCE_DEG = 1e-4
 
 
 def detections(path, report):
@@ -38,7 +38,9 @@ def detections(path, report):
         x, y = column("x"), column("y")
         return x, in_file(y, report), column("ra_deg"), column("dec_deg"), column("residual_px")
 
-    return columns([row for row in rows if row["id"]]), columns([row for row in rows if not row["id"]])
+    # Outside the circle of an all-sky lens a detection has no direction.
+    unnamed = [row for row in rows if not row["id"] and row["ra_deg"]]
+    return columns([row for row in rows if row["id"]]), columns(unnamed)
 
 
 def in_file(y, report):
@@ -63,6 +65,8 @@ def largest(x, y, x_there, y_there):
 def angles(wcs, report):
     """How far, in degrees, the centre and image-up are from what the report says."""
     centre_x, centre_y = (report["width"] - 1) / 2, (report["height"] - 1) / 2
+    if report["attitude"]["at"] == "axis":
+        centre_x, centre_y = report["optics"]["axis_px"]
     to_unit = lambda ra, dec: np.array(
         [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
     )
@@ -73,13 +77,12 @@ def angles(wcs, report):
     off = np.degrees(np.linalg.norm(at(centre_x, centre_y) - centre))
     east = np.array([-np.sin(ra), np.cos(ra), 0])
     north = np.cross(centre, east)
-    up = at(centre_x, centre_y - 1e-3) - at(centre_x, centre_y + 1e-3)
+    # The report's angle is that of the camera's axes: the right angle nearest to rows and columns.
+    right = at(centre_x + 0.1, centre_y) - at(centre_x - 0.1, centre_y)
+    down = at(centre_x, centre_y + 0.1) - at(centre_x, centre_y - 0.1)
+    left_vectors, _, right_vectors = np.linalg.svd(np.stack([right, down], axis=-1), full_matrices=False)
+    up = -(left_vectors @ right_vectors)[:, 1]
     angle = np.degrees(np.arctan2(up @ east, up @ north)) - attitude["up_pa_deg"]
-    # The report's angle is that of the camera's axes; the columns of a sheared image are inclined.
-    lens = report["optics"]["distortion"]
-    if lens and lens["model"] in ("cubic", "quintic"):
-        stretch, shear = np.array(lens["coefficients_px"][:2]) / lens["radius_px"]
-        angle += np.degrees(np.arctan2(-shear, 1 - stretch))
     return off, abs((angle + 180) % 360 - 180)
 
 
@@ -101,6 +104,12 @@ def check(path):
     width, height = report["width"], report["height"]
     gx, gy = np.meshgrid(np.linspace(-0.5, width - 0.5, 33), np.linspace(-0.5, height - 0.5, 33))
     gx, gy = gx.ravel(), gy.ravel()
+    if to_deg := report["optics"]["valid_to_deg"]:
+        # Within the part of the frame that sees the sky.
+        axis = np.array(report["optics"]["axis_px"])[:, None]
+        edge_px = np.max(np.hypot(x - axis[0], y - axis[1])) if len(x) else to_deg
+        inside = np.hypot(gx - axis[0], gy - axis[1]) < edge_px
+        gx, gy = gx[inside], gy[inside]
     sky = wcs.all_pix2world(gx, gy, 0)
     grid = largest(*by_header_inverse(wcs, *sky), gx, gy)
     off, turn = angles(wcs, report)

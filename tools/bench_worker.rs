@@ -123,7 +123,7 @@ impl Bench<'_> {
 
 fn to_json(ms: f64, found: Option<&Identification>) -> Value {
     let arcsec =
-        |found: &Identification| found.rms_px / found.camera.focal_length_px * ARCSEC_PER_RAD;
+        |found: &Identification| found.rms_px / found.camera.focal_length_px() * ARCSEC_PER_RAD;
     json!({
         "ms": ms,
         "solved": found.is_some(),

@@ -86,7 +86,7 @@ impl Times {
 
 /// A prior of the scale of `camera` with a total range of a factor of two.
 fn factor_of_two(camera: &CameraModel) -> Priors {
-    let scale_rad = 1.0 / camera.focal_length_px;
+    let scale_rad = 1.0 / camera.focal_length_px();
     Priors {
         scale: Some(ScalePrior::between(scale_rad / SQRT_2, scale_rad * SQRT_2)),
         ..Priors::default()

@@ -150,7 +150,7 @@ impl Tally {
         let sigma = attitude.covariance_rad2.diagonal().map(f64::sqrt);
         let focal_px = track
             .camera
-            .map_or(1.0, |(camera, _)| camera.focal_length_px);
+            .map_or(1.0, |(camera, _)| camera.focal_length_px());
         let off = attitude.icrs_to_camera.angle_to(truth);
         self.wrong += u64::from(off * focal_px > 1.0 && error.component_div(&sigma).amax() > 5.0);
         self.beyond_5_sigma += u64::from(error.component_div(&sigma).amax() > 5.0);
@@ -232,11 +232,7 @@ impl FullSolution {
     ) -> Option<Attitude> {
         let config = DetectConfig::default();
         detect_into(frame, &config, &mut self.workspace, &mut self.found).ok()?;
-        let pinhole = CameraModel {
-            distortion: None,
-            ..*camera
-        };
-        let centre = pinhole.centre();
+        let plain = camera.with_distortion(None);
         let mut stars = Vec::new();
         for star in tracker.used_stars() {
             let sources = self.found.sources.iter();
@@ -245,16 +241,15 @@ impl FullSolution {
                 apart(&a.position).total_cmp(&apart(&b.position))
             })?;
             if nearest.position.distance_to(&star.position) < 1.0 {
-                let [u, v] = camera.ideal_offset_of(&nearest.position);
                 let sigma_px = nearest.sigma_x_px.hypot(nearest.sigma_y_px) / 2f64.sqrt();
                 stars.push(MeasuredStar {
-                    pixel: PixelPoint::new(centre.x + u, centre.y + v),
+                    pixel: plain.pixel_of(&camera.direction_of(&nearest.position)?)?,
                     icrs: star.direction,
                     sigma_px,
                 });
             }
         }
-        let fit = fit_camera(&stars, &pinhole, start, None, &mut Vec::new())?;
+        let fit = fit_camera(&stars, &plain, start, None, &mut Vec::new())?;
         Some(fit.icrs_to_camera)
     }
 }

@@ -141,8 +141,8 @@ impl FrameRow {
             sigma_x_arcsec: Some(sigma.x),
             sigma_y_arcsec: Some(sigma.y),
             sigma_roll_arcsec: Some(sigma.roll),
-            fov_x_deg: Some(optics.fov_x_deg),
-            fov_y_deg: Some(optics.fov_y_deg),
+            fov_x_deg: optics.fov_x_deg,
+            fov_y_deg: optics.fov_y_deg,
             focal_length_px: Some(optics.focal_length_px),
             mirrored: optics.mirrored,
             matched: Some(matched.matched as u64),
@@ -160,11 +160,17 @@ impl FrameRow {
         let (camera, sky) = (&found.camera, found.icrs_to_camera.inverse());
         let [top_left, top_right, bottom_left, bottom_right] = camera.corners();
         let outline = [top_left, top_right, bottom_right, bottom_left];
-        let corners = outline.map(|pixel| sky.apply(&camera.direction_of(&pixel)));
+        let corners = outline.map(|pixel| camera.direction_of(&pixel));
         let diameter_deg = 2.0 * camera.radius_rad() * DEG_PER_RAD;
         Self {
             s_fov: Some((diameter_deg * 1e5).round() / 1e5),
-            s_region: polygon(&corners),
+            s_region: match corners {
+                [Some(a), Some(b), Some(c), Some(d)] => {
+                    polygon(&[a, b, c, d].map(|corner| sky.apply(&corner)))
+                }
+                // The corners of an all-sky frame see nothing.
+                _ => circle(&sky.apply(&UnitVector::BORESIGHT), 0.5 * diameter_deg),
+            },
             ..self
         }
     }
@@ -231,6 +237,12 @@ fn polygon(corners: &[UnitVector<Icrs>]) -> String {
         }
     }
     text
+}
+
+fn circle(centre: &UnitVector<Icrs>, radius_deg: f64) -> String {
+    let (ra_rad, dec_rad) = centre.to_ra_dec();
+    let [ra_deg, dec_deg] = [ra_rad, dec_rad].map(|angle_rad| angle_rad * DEG_PER_RAD);
+    format!("CIRCLE ICRS {ra_deg:.5} {dec_deg:.5} {radius_deg:.5}")
 }
 
 /// The date of the evening before: from noon to noon, in local mean time where the site is known.

@@ -1,19 +1,15 @@
-//! Distortion of the image by the lens and by differential refraction.
+//! Distortion of the image by the lens, in the camera's direction: ideal → observed.
 //!
-//! observed offset (u, v) from the frame's centre → ideal offset (u, v) + Σ cₖ Bₖ(u/R, v/R), in
-//! pixels.
+//! ideal offset from the axis → radial and decentring terms → stretch and skew → where the axis
+//! meets the frame → observed offset from the frame's centre, in pixels
 //!
-//! The direction is that of the SIP convention (Shupe et al. 2005, ASP Conf. 347, 491: pixel →
-//! ideal), so that a FITS header needs no inversion. R is half the frame's diagonal, so a
-//! coefficient is the displacement in pixels by its term at a corner. Rotation, shift and scale are
-//! not part of the distortion: they belong to the attitude and the focal length.
+//! This is the direction of OpenCV and of the text books. Offsets are divided by R, half the
+//! frame's diagonal, so a coefficient is a displacement in pixels at the distance of the corners.
+//!
+//! # Reference
+//! Brown 1971, Photogrammetric Engineering 37, 855.
 
-use multiversion::multiversion;
-
-/// Form of the distortion polynomial.
-///
-/// # Reference
-/// Brown 1971, Photogrammetric Engineering 37, 855 (radial and decentring terms).
+/// The terms of a lens that are not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum DistortionModel {
@@ -23,32 +19,37 @@ pub enum DistortionModel {
     Radial5,
     /// Three radial terms, r³, r⁵ and r⁷.
     Radial7,
-    /// [`DistortionModel::Radial7`], a decentred lens (2 terms) and a tilted detector (2).
+    /// [`DistortionModel::Radial7`], an axis off the frame's centre (2 terms), and a decentred lens
+    /// (2).
     BrownConrady,
-    /// Unequal scale along two axes (2 terms), second order (6) and third order (8): tilted
-    /// detectors, decentred lenses, differential refraction.
-    Cubic,
-    /// [`DistortionModel::Cubic`], fourth order (10 terms) and fifth order (12).
-    Quintic,
+    /// [`DistortionModel::BrownConrady`], unequal scales along two axes (2).
+    Stretched,
+    /// [`DistortionModel::Stretched`], and what no lens does: all monomials of second and third order
+    /// along each axis (14). Pictures that software has straightened, refraction.
+    Irregular3,
+    /// The same with all monomials of second to fifth order (36).
+    Irregular5,
 }
 
 impl DistortionModel {
-    /// Every model, simplest first.
-    pub const ALL: [Self; 6] = [
+    /// Every model, simplest first. Each has the terms of those before it.
+    pub const ALL: [Self; 7] = [
         Self::Radial,
         Self::Radial5,
         Self::Radial7,
         Self::BrownConrady,
-        Self::Cubic,
-        Self::Quintic,
+        Self::Stretched,
+        Self::Irregular3,
+        Self::Irregular5,
     ];
 
-    /// The models of lenses, simplest first. Each has the terms of those before it.
-    pub const LENSES: [Self; 4] = [
+    /// The models of lenses, simplest first.
+    pub(crate) const LENSES: [Self; 5] = [
         Self::Radial,
         Self::Radial5,
         Self::Radial7,
         Self::BrownConrady,
+        Self::Stretched,
     ];
 
     /// Number of coefficients.
@@ -57,10 +58,17 @@ impl DistortionModel {
             Self::Radial => 1,
             Self::Radial5 => 2,
             Self::Radial7 => 3,
-            Self::BrownConrady => LENS_TERMS,
-            Self::Cubic => 16,
-            Self::Quintic => 38,
+            Self::BrownConrady => 7,
+            Self::Stretched => LENS_TERMS,
+            Self::Irregular3 => LENS_TERMS + 14,
+            Self::Irregular5 => MAX_TERMS,
         }
+    }
+
+    /// The simplest model with this many coefficients or more.
+    pub fn with_terms(count: usize) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|model| count > 0 && model.terms() >= count)
     }
 
     /// Name, as in reports.
@@ -70,160 +78,61 @@ impl DistortionModel {
             Self::Radial5 => "radial5",
             Self::Radial7 => "radial7",
             Self::BrownConrady => "brown_conrady",
-            Self::Cubic => "cubic",
-            Self::Quintic => "quintic",
-        }
-    }
-
-    /// Order of the polynomial.
-    pub const fn order(self) -> usize {
-        match self {
-            Self::Radial | Self::Cubic => 3,
-            Self::Radial5 | Self::Quintic => 5,
-            Self::Radial7 | Self::BrownConrady => 7,
-        }
-    }
-
-    /// Whether it is one of [`Self::LENSES`], and not a polynomial of all monomials.
-    pub const fn is_lens(self) -> bool {
-        match self {
-            Self::Radial | Self::Radial5 | Self::Radial7 | Self::BrownConrady => true,
-            Self::Cubic | Self::Quintic => false,
+            Self::Stretched => "stretched",
+            Self::Irregular3 => "irregular3",
+            Self::Irregular5 => "irregular5",
         }
     }
 }
 
 /// Number of terms of a lens.
-pub const LENS_TERMS: usize = 7;
-
-/// The terms of a lens along u and v at a normalized offset: r³, r⁵, r⁷; a lens decentred along u
-/// and along v, in thirds, so that each is at most r²; a detector tilted along u and along v.
-#[inline(always)]
-pub(crate) fn lens_terms([u, v]: [f64; 2]) -> [[f64; LENS_TERMS]; 2] {
-    const THIRD: f64 = 1.0 / 3.0;
-    let [uu, uv, vv] = [u * u, u * v, v * v];
-    let r2 = uu + vv;
-    let (r4, r6) = (r2 * r2, r2 * r2 * r2);
-    let (far, across, near) = (uu + THIRD * vv, 2.0 * THIRD * uv, THIRD * uu + vv);
-    [
-        [u * r2, u * r4, u * r6, far, across, uu, uv],
-        [v * r2, v * r4, v * r6, across, near, uv, vv],
-    ]
-}
-
-/// Number of monomials of second and third order.
-pub(crate) const CUBIC_MONOMIALS: usize = 7;
+pub const LENS_TERMS: usize = 9;
 /// Number of monomials of second to fifth order.
-pub(crate) const QUINTIC_MONOMIALS: usize = 18;
+pub(crate) const MONOMIALS: usize = 18;
+/// Largest number of terms of any model.
+pub(crate) const MAX_TERMS: usize = LENS_TERMS + 2 * MONOMIALS;
+/// Number of radial terms: r³, r⁵ and r⁷.
+const RADIAL_TERMS: usize = 3;
+/// The term that shifts the axis along u; the next one does along v.
+const AXIS: usize = 3;
+/// The term of a lens that is decentred along u; the next one, along v.
+const DECENTRING: usize = 5;
+/// Unequal scales along u and v; the next one, along the diagonals.
+const STRETCH: usize = 7;
 
-/// The first `K` monomials of second and higher order: by order, then by falling power of u.
-#[inline]
-pub(crate) fn monomials<const K: usize>([u, v]: [f64; 2]) -> [f64; K] {
-    let (mut u_powers, mut v_powers) = ([1.0; MAX_ORDER + 1], [1.0; MAX_ORDER + 1]);
-    for power in 1..=MAX_ORDER {
-        u_powers[power] = u_powers[power - 1] * u;
-        v_powers[power] = v_powers[power - 1] * v;
-    }
-    let powers = const { powers::<K>() };
-    powers.map(|[of_u, of_v]| u_powers[of_u] * v_powers[of_v])
-}
-
-/// [`monomials`] for several offsets at once.
-#[inline(always)]
-pub(crate) fn monomials_in_lanes<const K: usize>([u, v]: [&[f64; LANES]; 2]) -> [[f64; LANES]; K] {
-    let (u_powers, v_powers) = (powers_of(u), powers_of(v));
-    let mut monomials = [[0.0; LANES]; K];
-    for (monomial, [of_u, of_v]) in monomials.iter_mut().zip(const { powers::<K>() }) {
-        for lane in 0..LANES {
-            monomial[lane] = u_powers[of_u][lane] * v_powers[of_v][lane];
-        }
-    }
-    monomials
-}
-
-#[inline(always)]
-fn powers_of(offsets: &[f64; LANES]) -> [[f64; LANES]; MAX_ORDER + 1] {
-    let mut powers = [[1.0; LANES]; MAX_ORDER + 1];
-    for power in 1..=MAX_ORDER {
-        for lane in 0..LANES {
-            powers[power][lane] = powers[power - 1][lane] * offsets[lane];
-        }
-    }
-    powers
-}
-
-/// The powers of u and v in the first `K` monomials.
-const fn powers<const K: usize>() -> [[usize; 2]; K] {
-    let mut powers = [[0; 2]; K];
-    let (mut order, mut of_v, mut next) = (2, 0, 0);
-    while next < K {
-        powers[next] = [order - of_v, of_v];
-        next += 1;
-        of_v += 1;
-        if of_v > order {
-            (order, of_v) = (order + 1, 0);
-        }
-    }
-    powers
-}
-
-/// Number of offsets that are computed together.
-pub(crate) const LANES: usize = 8;
-
-/// Inverts the polynomial for [`LANES`] offsets: the observed offsets, and whether each converged.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn apply_to_lanes(
-    distortion: &Distortion,
-    ideal: &[[f64; LANES]; 2],
-) -> ([[f64; LANES]; 2], [bool; LANES]) {
-    let mut observed = *ideal;
-    let (mut found, mut diverged) = ([false; LANES], [false; LANES]);
-    for _ in 0..INVERSION_STEPS {
-        let removed = distortion.remove_from_lanes(&observed);
-        let mut is_open = false;
-        for lane in 0..LANES {
-            let error = [0, 1].map(|axis| ideal[axis][lane] - removed[axis][lane]);
-            let is_done = found[lane] | diverged[lane];
-            for axis in 0..2 {
-                let next = observed[axis][lane] + error[axis];
-                observed[axis][lane] = if is_done { observed[axis][lane] } else { next };
-            }
-            let is_exact = error[0].abs() + error[1].abs() < INVERSION_TOLERANCE_PX;
-            let reach_px = observed[0][lane].abs() + observed[1][lane].abs();
-            let is_near = reach_px <= 10.0 * distortion.radius_px;
-            found[lane] |= !is_done & is_exact;
-            diverged[lane] |= !is_done & !is_exact & !is_near;
-            is_open |= !(found[lane] | diverged[lane]);
-        }
-        if !is_open {
-            break;
-        }
-    }
-    (observed, found)
-}
-
-/// Distortion relative to a pinhole camera.
+/// A distortion: a model and its coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distortion {
     model: DistortionModel,
     radius_px: f64,
     /// One per term of the model, then zeros.
     coefficients_px: [f64; MAX_TERMS],
+    /// Ideal distance from the axis, squared and in units of R, at which the image folds.
+    fold_sq: f64,
 }
 
-/// Highest order of any model.
-const MAX_ORDER: usize = 5;
-/// Largest number of terms of any model.
-const MAX_TERMS: usize = DistortionModel::Quintic.terms();
+/// An ideal offset as it is observed, and the derivatives.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observed {
+    /// Offset from the frame's centre, in pixels.
+    pub at: [f64; 2],
+    /// Derivatives of the two coordinates by those of the ideal offset.
+    pub by_ideal: [[f64; 2]; 2],
+    /// Derivatives of the two coordinates by each coefficient of a lens.
+    pub by_term: [[f64; LENS_TERMS]; 2],
+}
 
-/// Maximum number of steps of the fixed-point iteration that inverts the polynomial.
-const INVERSION_STEPS: usize = 50;
-/// Residual at which the iteration stops.
-const INVERSION_TOLERANCE_PX: f64 = 1e-5;
+/// Largest number of steps of Newton's method that inverts the distortion.
+const MAX_INVERSION_STEPS: usize = 25;
+/// Step at which the inversion ends, in units of R: its square is below any rounding.
+const INVERTED: f64 = 1e-9;
+/// Squared distance from the axis, in units of R, up to which folds are looked for. All of a frame is
+/// nearer than this.
+const FAR_SQ: f64 = 16.0;
 
 impl Distortion {
     /// Makes a distortion with one coefficient in pixels per term of `model`. Offsets are divided
-    /// by `radius_px` in the polynomial.
+    /// by `radius_px` in the terms.
     ///
     /// # Panics
     /// If the number of coefficients is not the number of terms.
@@ -231,11 +140,24 @@ impl Distortion {
         assert_eq!(coefficients_px.len(), model.terms(), "one per term");
         let mut padded = [0.0; MAX_TERMS];
         padded[..model.terms()].copy_from_slice(coefficients_px);
+        let radial = [0, 1, 2].map(|term: usize| padded[term] / radius_px);
         Self {
             model,
             radius_px,
             coefficients_px: padded,
+            fold_sq: fold_sq(radial),
         }
+    }
+
+    /// The same with a larger coefficient of r³; `more` is in units of R.
+    pub(crate) fn with_more_of_third_order(&self, more: f64) -> Self {
+        let mut coefficients_px = self.coefficients_px;
+        coefficients_px[0] += more * self.radius_px;
+        Self::new(
+            self.model,
+            self.radius_px,
+            &coefficients_px[..self.model.terms()],
+        )
     }
 
     /// The distortion model.
@@ -248,230 +170,378 @@ impl Distortion {
         self.radius_px
     }
 
-    /// The coefficients in pixels, one per term, with (u, v) the normalized offset and r its length.
-    ///
-    /// - Lenses, as many as the model has: r² (u, v); r⁴ (u, v); r⁶ (u, v); (u² + v²/3, 2uv/3) and
-    ///   (2uv/3, u²/3 + v²), decentring; u (u, v) and v (u, v), tilt.
-    /// - Other models: (u, −v) and (v, u), then two for each monomial of second and higher order,
-    ///   along u and along v; monomials are sorted by order, then by falling power of u.
+    /// The coefficients in pixels, as many as the model has, with (u, v) the ideal offset in units of
+    /// R and r its length: r² (u, v); r⁴ (u, v); r⁶ (u, v); the axis, (1, 0) and (0, 1); decentring,
+    /// (u² + v²/3, 2uv/3) and (2uv/3, u²/3 + v²); and of the result, without the axis, the stretch
+    /// (u, −v) and the skew (v, u). Then two for each monomial, along u and along v; monomials are
+    /// sorted by order, then by falling power of u.
     pub fn coefficients_px(&self) -> &[f64] {
         &self.coefficients_px[..self.model.terms()]
     }
 
-    /// The terms of the polynomial: powers of u/R and v/R, and the coefficients along u and v in
-    /// pixels. The same powers may occur more than once.
-    pub fn monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
-        if self.model.is_lens() {
-            return self.lens_monomials();
-        }
-        let c = self.coefficients_px();
-        let mut monomials = vec![(1, 0, [c[0], c[1]]), (0, 1, [c[1], -c[0]])];
-        let powers = const { powers::<QUINTIC_MONOMIALS>() };
-        let pairs = c[2..].as_chunks().0;
-        monomials.extend(
-            powers
-                .iter()
-                .zip(pairs)
-                .map(|([p, q], pair)| (*p, *q, *pair)),
-        );
-        monomials
+    /// Where the axis meets the frame, as an offset from its centre along the camera's x and y axes,
+    /// in pixels.
+    pub fn axis_offset_px(&self) -> [f64; 2] {
+        [self.coefficients_px[AXIS], self.coefficients_px[AXIS + 1]]
     }
 
-    /// The terms of a lens, expanded.
-    fn lens_monomials(&self) -> Vec<(usize, usize, [f64; 2])> {
-        let [third, fifth, seventh, along_u, along_v, tilt_u, tilt_v] = self.lens_coefficients();
-        let across = [2.0 / 3.0 * along_u, 2.0 / 3.0 * along_v];
-        let mut monomials = vec![
-            (2, 0, [along_u + tilt_u, along_v / 3.0]),
-            (1, 1, [across[1] + tilt_v, across[0] + tilt_u]),
-            (0, 2, [along_u / 3.0, along_v + tilt_v]),
-        ];
-        // r² = u² + v², and its powers.
-        let expanded: [(f64, &[f64]); 3] = [
-            (third, &[1.0, 1.0]),
-            (fifth, &[1.0, 2.0, 1.0]),
-            (seventh, &[1.0, 3.0, 3.0, 1.0]),
-        ];
-        for (coefficient, binomials) in expanded {
-            let most = 2 * (binomials.len() - 1);
-            for (of_v, binomial) in binomials.iter().enumerate() {
-                let (p, q, value) = (most - 2 * of_v, 2 * of_v, coefficient * binomial);
-                monomials.push((p + 1, q, [value, 0.0]));
-                monomials.push((p, q + 1, [0.0, value]));
+    /// The coefficients of the lens in units of R.
+    #[inline(always)]
+    fn normalized(&self) -> [f64; LENS_TERMS] {
+        std::array::from_fn(|term| self.coefficients_px[term] / self.radius_px)
+    }
+
+    /// The displacement by the monomials at an ideal offset in units of R, and its derivatives by the
+    /// offset, in the same units.
+    #[inline]
+    fn irregular(&self, offset: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+        let (mut moved, mut by_ideal) = ([0.0; 2], [[0.0; 2]; 2]);
+        if self.model < DistortionModel::Irregular3 {
+            return (moved, by_ideal);
+        }
+        let coefficients = self.coefficients_px[LENS_TERMS..].as_chunks::<2>().0;
+        let values = monomials(offset).into_iter().zip(monomial_slopes(offset));
+        for (coefficients, (value, slopes)) in coefficients.iter().zip(values) {
+            for axis in 0..2 {
+                let coefficient = coefficients[axis] / self.radius_px;
+                moved[axis] += coefficient * value;
+                by_ideal[axis][0] += coefficient * slopes[0];
+                by_ideal[axis][1] += coefficient * slopes[1];
             }
         }
-        let order = self.model.order();
-        monomials.retain(|(p, q, _)| p + q <= order);
-        monomials
+        (moved, by_ideal)
     }
 
-    /// The coefficients of all terms of a lens; those that the model lacks are 0.
-    #[inline(always)]
-    fn lens_coefficients(&self) -> [f64; LENS_TERMS] {
-        std::array::from_fn(|term| self.coefficients_px[term])
-    }
-
-    /// Converts the observed offset to the ideal one, in pixels.
+    /// Converts the ideal offset from the axis to the observed one from the frame's centre, in
+    /// pixels. `None` where the image would fold.
     #[inline]
-    pub fn remove(&self, observed: [f64; 2]) -> [f64; 2] {
-        let [u, v] = [observed[0] / self.radius_px, observed[1] / self.radius_px];
-        match self.model {
-            DistortionModel::Radial
-            | DistortionModel::Radial5
-            | DistortionModel::Radial7
-            | DistortionModel::BrownConrady => self.lens([u, v], observed),
-            DistortionModel::Cubic => self.polynomial::<CUBIC_MONOMIALS>([u, v], observed),
-            DistortionModel::Quintic => self.polynomial::<QUINTIC_MONOMIALS>([u, v], observed),
-        }
-    }
-
-    /// Adds the displacement by a lens at the normalized offset to `observed`.
-    #[inline(always)]
-    fn lens(&self, offset: [f64; 2], observed: [f64; 2]) -> [f64; 2] {
-        let (terms, c) = (lens_terms(offset), self.lens_coefficients());
-        let shift = |axis: usize| -> f64 { terms[axis].iter().zip(&c).map(|(t, c)| t * c).sum() };
-        [observed[0] + shift(0), observed[1] + shift(1)]
-    }
-
-    /// Adds the displacement by a model with `K` monomials at the normalized offset to `observed`.
-    #[inline]
-    fn polynomial<const K: usize>(&self, [u, v]: [f64; 2], observed: [f64; 2]) -> [f64; 2] {
-        let c = &self.coefficients_px;
-        let mut along_u = observed[0] + c[0] * u + c[1] * v;
-        let mut along_v = observed[1] - c[0] * v + c[1] * u;
-        for (monomial, [of_u, of_v]) in monomials::<K>([u, v]).iter().zip(c[2..].as_chunks().0) {
-            along_u += of_u * monomial;
-            along_v += of_v * monomial;
-        }
-        [along_u, along_v]
-    }
-
-    /// Converts the ideal offset to the observed one, in pixels. `None` if the inversion does not
-    /// converge, which may happen far outside the frame.
     pub fn apply(&self, ideal: [f64; 2]) -> Option<[f64; 2]> {
-        let mut observed = ideal;
-        for _ in 0..INVERSION_STEPS {
-            let removed = self.remove(observed);
-            let error = [ideal[0] - removed[0], ideal[1] - removed[1]];
-            observed = [observed[0] + error[0], observed[1] + error[1]];
-            if error[0].abs() + error[1].abs() < INVERSION_TOLERANCE_PX {
-                return Some(observed);
-            }
-            let reach_px = observed[0].abs() + observed[1].abs();
-            if reach_px.is_nan() || reach_px > 10.0 * self.radius_px {
+        let c = self.normalized();
+        let [u, v] = ideal.map(|along| along / self.radius_px);
+        let r2 = u * u + v * v;
+        if r2 >= self.fold_sq {
+            return None;
+        }
+        let [du, dv] = distorted(&c, [u, v]);
+        let [stretch, skew] = [c[STRETCH], c[STRETCH + 1]];
+        let ([mu, mv], _) = self.irregular([u, v]);
+        let along_u = du + stretch * du + skew * dv + c[AXIS] + mu;
+        let along_v = dv - stretch * dv + skew * du + c[AXIS + 1] + mv;
+        Some([along_u * self.radius_px, along_v * self.radius_px])
+    }
+
+    /// [`Self::apply`], with the derivatives.
+    #[inline]
+    pub(crate) fn observe(&self, ideal: [f64; 2]) -> Option<Observed> {
+        let at = self.apply(ideal)?;
+        let c = self.normalized();
+        let offset = ideal.map(|along| along / self.radius_px);
+        let [du, dv] = distorted(&c, offset);
+        let [[uu, uv], [vu, vv]] = slope(&c, offset);
+        let [stretch, skew] = [c[STRETCH], c[STRETCH + 1]];
+        let stretched = |[u, v]: [f64; 2]| [u + stretch * u + skew * v, v - stretch * v + skew * u];
+        let ([by_u_u, by_u_v], [by_v_u, by_v_v]) = (stretched([uu, vu]), stretched([uv, vv]));
+        let mut by_term = [[0.0; LENS_TERMS]; 2];
+        let before = terms_before_stretch(offset);
+        for term in 0..STRETCH {
+            let moved = match term {
+                AXIS => [1.0, 0.0],
+                of_axis if of_axis == AXIS + 1 => [0.0, 1.0],
+                _ => stretched([before[0][term], before[1][term]]),
+            };
+            (by_term[0][term], by_term[1][term]) = (moved[0], moved[1]);
+        }
+        (by_term[0][STRETCH], by_term[1][STRETCH]) = (du, -dv);
+        (by_term[0][STRETCH + 1], by_term[1][STRETCH + 1]) = (dv, du);
+        let (_, [of_u, of_v]) = self.irregular(offset);
+        Some(Observed {
+            at,
+            by_ideal: [
+                [by_u_u + of_u[0], by_v_u + of_u[1]],
+                [by_u_v + of_v[0], by_v_v + of_v[1]],
+            ],
+            by_term,
+        })
+    }
+
+    /// Converts the observed offset from the frame's centre to the ideal one from the axis, in
+    /// pixels. `None` where nothing is imaged.
+    #[inline]
+    pub fn remove(&self, observed: [f64; 2]) -> Option<[f64; 2]> {
+        let c = self.normalized();
+        let [along_u, along_v] =
+            [0, 1].map(|axis| observed[axis] / self.radius_px - c[AXIS + axis]);
+        let [stretch, skew] = [c[STRETCH], c[STRETCH + 1]];
+        let determinant = 1.0 - stretch * stretch - skew * skew;
+        let unstretched = |[u, v]: [f64; 2]| {
+            [
+                ((1.0 - stretch) * u - skew * v) / determinant,
+                ((1.0 + stretch) * v - skew * u) / determinant,
+            ]
+        };
+        let wanted = unstretched([along_u, along_v]);
+        let mut offset = wanted;
+        for _ in 0..MAX_INVERSION_STEPS {
+            let [du, dv] = distorted(&c, offset);
+            let [[uu, uv], [vu, vv]] = slope(&c, offset);
+            let (moved, [of_u, of_v]) = self.irregular(offset);
+            let [mu, mv] = unstretched(moved);
+            let [left_u, left_v] = [wanted[0] - du - mu, wanted[1] - dv - mv];
+            let ([uu, vu], [uv, vv]) = {
+                let ([a, b], [c, d]) = (
+                    unstretched([of_u[0], of_v[0]]),
+                    unstretched([of_u[1], of_v[1]]),
+                );
+                ([uu + a, vu + b], [uv + c, vv + d])
+            };
+            let determinant = uu * vv - uv * vu;
+            let step = [
+                (vv * left_u - uv * left_v) / determinant,
+                (uu * left_v - vu * left_u) / determinant,
+            ];
+            let length = step[0].abs() + step[1].abs();
+            if !length.is_finite() {
                 return None;
+            }
+            // A step beyond the fold would end on its far side.
+            let shrink = (0.5 / length).min(1.0);
+            offset = [offset[0] + shrink * step[0], offset[1] + shrink * step[1]];
+            if length < INVERTED {
+                let [u, v] = offset;
+                let is_before_fold = u * u + v * v < self.fold_sq;
+                return is_before_fold.then(|| offset.map(|along| along * self.radius_px));
             }
         }
         None
     }
 
-    /// [`Self::apply`] for several offsets in vector registers, with identical results; `None`
-    /// becomes false.
-    pub(super) fn apply_to_lanes(
-        &self,
-        ideal: &[[f64; LANES]; 2],
-    ) -> ([[f64; LANES]; 2], [bool; LANES]) {
-        apply_to_lanes(self, ideal)
-    }
-
-    /// [`Self::remove`] for several offsets.
-    #[inline(always)]
-    pub(super) fn remove_from_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
-        match self.model {
-            DistortionModel::Radial
-            | DistortionModel::Radial5
-            | DistortionModel::Radial7
-            | DistortionModel::BrownConrady => self.lens_lanes(observed),
-            DistortionModel::Cubic => self.polynomial_lanes::<CUBIC_MONOMIALS>(observed),
-            DistortionModel::Quintic => self.polynomial_lanes::<QUINTIC_MONOMIALS>(observed),
-        }
-    }
-
-    #[inline(always)]
-    fn lens_lanes(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
-        let mut ideal = *observed;
-        for lane in 0..LANES {
-            let observed = [observed[0][lane], observed[1][lane]];
-            let offset = observed.map(|along| along / self.radius_px);
-            [ideal[0][lane], ideal[1][lane]] = self.lens(offset, observed);
-        }
-        ideal
-    }
-
-    #[inline(always)]
-    fn polynomial_lanes<const K: usize>(&self, observed: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
-        let c = &self.coefficients_px;
-        let [u, v] = observed.map(|offsets| offsets.map(|offset| offset / self.radius_px));
-        let mut ideal = *observed;
-        for lane in 0..LANES {
-            ideal[0][lane] = observed[0][lane] + c[0] * u[lane] + c[1] * v[lane];
-            ideal[1][lane] = observed[1][lane] - c[0] * v[lane] + c[1] * u[lane];
-        }
-        let monomials = monomials_in_lanes::<K>([&u, &v]);
-        for (monomial, pair) in monomials.iter().zip(c[2..].as_chunks::<2>().0) {
-            for lane in 0..LANES {
-                ideal[0][lane] += pair[0] * monomial[lane];
-                ideal[1][lane] += pair[1] * monomial[lane];
-            }
-        }
-        ideal
-    }
-
-    /// The largest displacement on a circle of radius R, in pixels.
+    /// The largest displacement on a circle of radius R, without that of the axis, in pixels.
     pub fn largest_px(&self) -> f64 {
+        let [axis_u, axis_v] = self.axis_offset_px();
         (0..64)
             .map(|step| {
-                let (sin, cos) = (f64::from(step) / 64.0 * std::f64::consts::TAU).sin_cos();
+                let (sin, cos) = libm::sincos(f64::from(step) / 64.0 * std::f64::consts::TAU);
                 let edge = [self.radius_px * cos, self.radius_px * sin];
-                let ideal = self.remove(edge);
-                (ideal[0] - edge[0]).hypot(ideal[1] - edge[1])
+                let moved = self
+                    .apply(edge)
+                    .map(|[u, v]| libm::hypot(u - axis_u - edge[0], v - axis_v - edge[1]));
+                // Where the image folds nothing is seen.
+                moved.unwrap_or(self.radius_px)
             })
             .fold(0.0, f64::max)
     }
+}
+
+/// Radial and decentring terms at an ideal offset in units of R, with coefficients in the same.
+#[inline(always)]
+fn distorted(c: &[f64; LENS_TERMS], [u, v]: [f64; 2]) -> [f64; 2] {
+    const THIRD: f64 = 1.0 / 3.0;
+    let [uu, uv, vv] = [u * u, u * v, v * v];
+    let r2 = uu + vv;
+    let radial = 1.0 + r2 * (c[0] + r2 * (c[1] + r2 * c[2]));
+    let [p, q] = [c[DECENTRING], c[DECENTRING + 1]];
+    [
+        u * radial + p * (uu + THIRD * vv) + q * (2.0 * THIRD * uv),
+        v * radial + p * (2.0 * THIRD * uv) + q * (THIRD * uu + vv),
+    ]
+}
+
+/// Derivatives of [`distorted`].
+#[inline(always)]
+fn slope(c: &[f64; LENS_TERMS], [u, v]: [f64; 2]) -> [[f64; 2]; 2] {
+    const THIRD: f64 = 1.0 / 3.0;
+    let r2 = u * u + v * v;
+    let radial = 1.0 + r2 * (c[0] + r2 * (c[1] + r2 * c[2]));
+    let twice = 2.0 * (c[0] + r2 * (2.0 * c[1] + r2 * 3.0 * c[2]));
+    let [p, q] = [c[DECENTRING], c[DECENTRING + 1]];
+    let across = twice * u * v + 2.0 * THIRD * (p * v + q * u);
+    [
+        [
+            radial + twice * u * u + 2.0 * p * u + 2.0 * THIRD * q * v,
+            across,
+        ],
+        [
+            across,
+            radial + twice * v * v + 2.0 * THIRD * p * u + 2.0 * q * v,
+        ],
+    ]
+}
+
+/// The radial and decentring terms along u and v, without the stretch.
+#[inline(always)]
+fn terms_before_stretch([u, v]: [f64; 2]) -> [[f64; STRETCH]; 2] {
+    const THIRD: f64 = 1.0 / 3.0;
+    let [uu, uv, vv] = [u * u, u * v, v * v];
+    let r2 = uu + vv;
+    let (r4, r6) = (r2 * r2, r2 * r2 * r2);
+    let (far, across, near) = (uu + THIRD * vv, 2.0 * THIRD * uv, THIRD * uu + vv);
+    [
+        [u * r2, u * r4, u * r6, 0.0, 0.0, far, across],
+        [v * r2, v * r4, v * r6, 0.0, 0.0, across, near],
+    ]
+}
+
+/// The powers of u and v in the monomials.
+const POWERS: [[usize; 2]; MONOMIALS] = {
+    let mut powers = [[0; 2]; MONOMIALS];
+    let (mut order, mut of_v, mut next) = (2, 0, 0);
+    while next < MONOMIALS {
+        powers[next] = [order - of_v, of_v];
+        next += 1;
+        of_v += 1;
+        if of_v > order {
+            (order, of_v) = (order + 1, 0);
+        }
+    }
+    powers
+};
+
+/// The powers of a number from 0 to 5.
+#[inline(always)]
+fn powers_of(base: f64) -> [f64; 6] {
+    let squared = base * base;
+    let cubed = squared * base;
+    [
+        1.0,
+        base,
+        squared,
+        cubed,
+        squared * squared,
+        squared * cubed,
+    ]
+}
+
+/// The monomials at an offset in units of R.
+#[inline]
+pub(crate) fn monomials([u, v]: [f64; 2]) -> [f64; MONOMIALS] {
+    let (of_u, of_v) = (powers_of(u), powers_of(v));
+    POWERS.map(|[p, q]| of_u[p] * of_v[q])
+}
+
+/// Their derivatives by u and v.
+#[inline]
+fn monomial_slopes([u, v]: [f64; 2]) -> [[f64; 2]; MONOMIALS] {
+    let (of_u, of_v) = (powers_of(u), powers_of(v));
+    POWERS.map(|[p, q]| {
+        let by_u = p as f64 * of_u[p.saturating_sub(1)] * of_v[q];
+        let by_v = q as f64 * of_u[p] * of_v[q.saturating_sub(1)];
+        [by_u, by_v]
+    })
+}
+
+/// The squared distance from the axis at which the observed distance no longer grows with the ideal
+/// one: the smallest positive root of 1 + 3 k₁ x + 5 k₂ x² + 7 k₃ x³.
+fn fold_sq([k1, k2, k3]: [f64; RADIAL_TERMS]) -> f64 {
+    const STEPS: u32 = 64;
+    const BISECTIONS: usize = 40;
+    let growth = |x: f64| 1.0 + x * (3.0 * k1 + x * (5.0 * k2 + x * 7.0 * k3));
+    if k1 >= 0.0 && k2 >= 0.0 && k3 >= 0.0 {
+        return FAR_SQ;
+    }
+    let step = FAR_SQ / f64::from(STEPS);
+    let folded = (1..=STEPS).map(|i| f64::from(i) * step);
+    let Some(mut high) = { folded }.find(|x| growth(*x) <= 0.0) else {
+        return FAR_SQ;
+    };
+    let mut low = high - step;
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if growth(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const RADIUS_PX: f64 = 500.0;
+
+    fn distortions() -> impl Iterator<Item = Distortion> {
+        let lens = [-40.0, 12.0, -3.0, 15.0, -9.0, 2.0, -3.0, 11.0, 4.0];
+        let others = (0..2 * MONOMIALS).map(|i| 0.7 - 0.3 * (i % 6) as f64);
+        let all: Vec<f64> = lens.into_iter().chain(others).collect();
+        DistortionModel::ALL
+            .into_iter()
+            .map(move |model| Distortion::new(model, RADIUS_PX, &all[..model.terms()]))
+    }
+
     #[test]
-    fn the_expanded_polynomial_is_the_displacement() {
-        for model in DistortionModel::ALL {
-            let coefficient = |term: usize| 3.0 - 1.7 * (term % 5) as f64;
-            let coefficients: Vec<f64> = (0..model.terms()).map(coefficient).collect();
-            let distortion = Distortion::new(model, 500.0, &coefficients);
-            for [u, v] in [[0.3_f64, -0.8], [-0.6, 0.1], [0.7, 0.7]] {
-                let [mut along_u, mut along_v] = [500.0 * u, 500.0 * v];
-                for (p, q, [of_u, of_v]) in distortion.monomials() {
-                    assert!(p + q <= model.order(), "{model:?}");
-                    let monomial = u.powi(p as i32) * v.powi(q as i32);
-                    along_u += of_u * monomial;
-                    along_v += of_v * monomial;
-                }
-                let found = distortion.remove([500.0 * u, 500.0 * v]);
-                let off_px = (found[0] - along_u).hypot(found[1] - along_v);
-                assert!(off_px < 1e-10, "{model:?} {off_px}");
+    fn offsets_are_found_again() {
+        for distortion in distortions() {
+            for step in 0..40 {
+                let (sin, cos) = f64::from(step).sin_cos();
+                let radius_px = f64::from(step) * 14.0;
+                let ideal = [radius_px * cos, radius_px * sin];
+                let observed = distortion.apply(ideal).unwrap();
+                let back = distortion.remove(observed).unwrap();
+                let off_px = (back[0] - ideal[0]).hypot(back[1] - ideal[1]);
+                assert!(off_px < 1e-9, "{:?} {off_px}", distortion.model());
             }
         }
     }
 
     #[test]
-    fn each_term_of_a_lens_moves_a_point_on_its_axis_at_the_radius_by_its_coefficient() {
-        for term in 0..LENS_TERMS {
-            let mut coefficients = [0.0; LENS_TERMS];
-            coefficients[term] = 1.0;
-            let model = DistortionModel::BrownConrady;
-            let distortion = Distortion::new(model, 100.0, &coefficients);
-            let at = if matches!(term, 4 | 6) {
-                [0.0, 100.0]
-            } else {
-                [100.0, 0.0]
-            };
-            let found = distortion.remove(at);
-            assert!(
-                (found[0] + found[1] - 101.0).abs() < 1e-12,
-                "{term} {found:?}"
-            );
+    fn the_derivatives_are_those_of_small_steps() {
+        const STEP_PX: f64 = 1e-3;
+        let ideal = [230.0, -170.0];
+        for distortion in distortions() {
+            let observed = distortion.observe(ideal).unwrap();
+            assert_eq!(Some(observed.at), distortion.apply(ideal));
+            for along in 0..2 {
+                let there = |by: f64| {
+                    let mut ideal = ideal;
+                    ideal[along] += by;
+                    distortion.apply(ideal).unwrap()
+                };
+                let (low, high) = (there(-STEP_PX), there(STEP_PX));
+                for axis in 0..2 {
+                    let slope = (high[axis] - low[axis]) / (2.0 * STEP_PX);
+                    assert!((observed.by_ideal[axis][along] - slope).abs() < 1e-7);
+                }
+            }
+            for term in 0..distortion.model().terms().min(LENS_TERMS) {
+                let there = |by: f64| {
+                    let mut coefficients_px = distortion.coefficients_px().to_vec();
+                    coefficients_px[term] += by;
+                    let moved = Distortion::new(distortion.model(), RADIUS_PX, &coefficients_px);
+                    moved.apply(ideal).unwrap()
+                };
+                let (low, high) = (there(-STEP_PX), there(STEP_PX));
+                for axis in 0..2 {
+                    let slope = (high[axis] - low[axis]) / (2.0 * STEP_PX);
+                    assert!(
+                        (observed.by_term[axis][term] - slope).abs() < 1e-7,
+                        "{term}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_imaged_beyond_the_fold() {
+        // r − 0.1 r³ is largest, 1.217, at r = 1.826.
+        let distortion = Distortion::new(DistortionModel::Radial, 100.0, &[-10.0]);
+        assert!(distortion.apply([182.0, 0.0]).is_some());
+        assert_eq!(distortion.apply([183.0, 0.0]), None);
+        assert!(distortion.remove([0.0, 121.0]).is_some());
+        assert_eq!(distortion.remove([0.0, 122.0]), None);
+    }
+
+    #[test]
+    fn a_radial_coefficient_is_the_displacement_at_the_radius() {
+        for term in [0, 1, 2, 5, 7] {
+            let mut coefficients_px = [0.0; LENS_TERMS];
+            coefficients_px[term] = 1.0;
+            let distortion = Distortion::new(DistortionModel::Stretched, 100.0, &coefficients_px);
+            let observed = distortion.apply([100.0, 0.0]).unwrap();
+            assert!((observed[0] - 101.0).abs() < 1e-12 && observed[1] == 0.0);
+            assert!((distortion.largest_px() - 1.0).abs() < 1e-9);
         }
     }
 }

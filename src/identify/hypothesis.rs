@@ -1,8 +1,8 @@
 //! A hypothesis about pointing and scale, and the catalogue stars that it predicts in the frame.
 
-use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::units::RAD_PER_DEG;
-use crate::camera::{CameraModel, LANES};
+use crate::camera::CameraModel;
 use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::index::IndexedCatalog;
 use crate::identify::predict::{PredictedStar, PredictionDepth, SkyView, Surroundings};
@@ -27,6 +27,8 @@ pub struct Hypothesis {
     pub icrs_to_camera: Rotation<Icrs, Camera>,
     /// Number of parameters fitted to the stars.
     pub parameters: usize,
+    /// Number of stars that they were fitted to.
+    pub fitted_stars: usize,
     /// Johnson V minus observed magnitude.
     pub zero_point_mag: f64,
 }
@@ -138,20 +140,15 @@ impl Hypothesis {
 
     /// Updates the positions of the stars to those of this hypothesis.
     pub fn predict_again(&self, predicted: &mut [PredictedStar]) {
-        for stars in predicted.chunks_mut(LANES) {
-            let mut directions = [UnitVector::BORESIGHT; LANES];
-            for (direction, star) in directions.iter_mut().zip(&*stars) {
-                *direction = self.icrs_to_camera.apply(&star.direction);
-            }
-            for (star, pixel) in stars.iter_mut().zip(self.camera.pixels_of(&directions)) {
-                star.pixel = pixel.unwrap_or(star.pixel);
-            }
+        for star in predicted {
+            let direction = self.icrs_to_camera.apply(&star.direction);
+            star.pixel = self.camera.pixel_of(&direction).unwrap_or(star.pixel);
         }
     }
 
     /// Density of `count` stars in the frame, per square degree.
     fn per_sq_deg(&self, count: usize) -> f64 {
-        count as f64 * RAD_PER_DEG.powi(2) / (self.camera.fov_x_rad() * self.camera.fov_y_rad())
+        count as f64 * RAD_PER_DEG.powi(2) / self.camera.solid_angle_sr()
     }
 
     /// The magnitude difference in units of the tolerance; `None` beyond it. No star is too bright

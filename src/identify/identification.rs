@@ -39,7 +39,7 @@ impl Identification {
     /// Adds an error of the positions that all of them share, in pixels on each axis: only the attitude
     /// follows it.
     pub fn add_common_error(&mut self, sigma_px: f64) {
-        let sigma_rad = sigma_px / self.camera.focal_length_px;
+        let sigma_rad = sigma_px / self.camera.focal_length_px();
         for axis in 0..2 {
             self.attitude_covariance_rad2[(axis, axis)] += sigma_rad * sigma_rad;
         }

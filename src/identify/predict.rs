@@ -1,7 +1,7 @@
 //! Predicts the positions of catalogue stars in a frame.
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
-use crate::camera::{CameraModel, LANES};
+use crate::camera::CameraModel;
 use crate::identify::index::IndexedCatalog;
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
@@ -9,11 +9,13 @@ use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 /// Margin outside the frame, in units of its diagonal, within which a predicted star may still be
 /// observed.
 const MARGIN: f64 = 0.01;
-/// Largest shift by lens distortion, in units of the frame's half diagonal.
-const UNDISTORTED_MARGIN: f64 = 0.1;
+/// Stars whose directions are looked up together, so that the memory accesses overlap.
+const LANES: usize = 8;
 /// Margin around a view, in units of its radius, within which stars are gathered, as the next view
 /// differs a little.
 const GATHERED_MARGIN: f64 = 0.04;
+/// Room for proper motion in the first, rough test of a star, in margins.
+const NEAR: f64 = 5.0;
 /// Magnitudes to go deeper where the stars are too few.
 const DEEPER_MAG: f64 = 0.7;
 
@@ -186,19 +188,18 @@ fn project(
 ) {
     let camera = view.camera;
     let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
-    // The cone is larger than the frame: a quick test rejects most stars outside it.
-    let nearly_px = margin_px + UNDISTORTED_MARGIN * camera.radius_px();
-    let reach = [camera.width_px, camera.height_px]
-        .map(|extent_px| (0.5 * extent_px + nearly_px) / camera.focal_length_px);
     let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
+    // The cone is larger than the frame: a quick test rejects most stars outside it. Stars move by less
+    // than the margin until the date of the frame.
     let is_near = |star: &&GridStar| {
-        let d = view.icrs_to_camera.matrix() * star.vector();
-        d.z > 0.0 && d.x.abs() <= reach[0] * d.z && d.y.abs() <= reach[1] * d.z
+        let direction = UnitVector::from_unit(view.icrs_to_camera.matrix() * star.vector());
+        let pixel = camera.pixel_of(&direction);
+        pixel.is_some_and(|pixel| camera.nearly_contains(&pixel, NEAR * margin_px))
     };
     let mut near = stars
         .iter()
-        .filter(is_near)
-        .filter(|star| star.is_within(boresight.as_vector(), chord * chord));
+        .filter(|star| star.is_within(boresight.as_vector(), chord * chord))
+        .filter(is_near);
     predicted.clear();
     loop {
         let mut lanes = [None; LANES];
@@ -211,15 +212,11 @@ fn project(
                 sky.stars()[star.index.get()].direction_at(view.years_since_j2000)
             })
         });
-        let in_camera = directions.map(|direction| view.icrs_to_camera.apply(&direction));
-        for ((lane, direction), pixel) in lanes
-            .iter()
-            .zip(directions)
-            .zip(camera.pixels_of(&in_camera))
-        {
+        for (lane, direction) in lanes.iter().zip(directions) {
             let Some(star) = lane else {
                 return;
             };
+            let pixel = camera.pixel_of(&view.icrs_to_camera.apply(&direction));
             let Some(pixel) = pixel.filter(|p| camera.nearly_contains(p, margin_px)) else {
                 continue;
             };

@@ -1,8 +1,10 @@
 //! Identification of one star field in two parts: where the camera points, then which star is
 //! which, with the final fit to all of them.
 
+use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::interrupt::Interrupt;
-use crate::camera::DistortionModel;
+use crate::base::units::RAD_PER_DEG;
+use crate::camera::{CameraModel, DistortionModel};
 use crate::identify::effort::Effort;
 use crate::identify::field::{CoarserFields, StarField};
 use crate::identify::fit::{NamingStart, Refined, Start};
@@ -12,7 +14,8 @@ use crate::identify::index::IndexedCatalog;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
 use crate::identify::search::{
-    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers,
+    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers, Window,
+    Windows,
 };
 use std::f64::consts::PI;
 
@@ -84,6 +87,7 @@ pub struct Workspace {
     buffers: SearchBuffers,
     thinning: Thinning,
     tiers: Tiers,
+    windows: Windows,
     bright: Brightest,
     answer: Option<Identification>,
 }
@@ -103,6 +107,7 @@ impl Workspace {
             buffers: SearchBuffers::default(),
             thinning: Thinning::default(),
             tiers: Tiers::default(),
+            windows: Windows::default(),
             bright: Brightest::default(),
             answer: None,
         }
@@ -194,6 +199,7 @@ impl Workspace {
             buffers,
             thinning,
             tiers,
+            windows,
             bright,
             answer,
         } = self;
@@ -209,22 +215,30 @@ impl Workspace {
             let of = |field| Problem { field, ..whole };
             let coarse = coarser.into_iter().flat_map(|coarser| {
                 let fields = (0..coarser.count()).filter_map(|number| coarser.field(number));
-                fields.map(|field| (of(field), SearchPlan::coarse(*effort)))
+                fields.map(|field| Choice::new(of(field), SearchPlan::coarse(*effort)))
             });
-            let of_whole = coarser.map(|_| (whole, SearchPlan::votes(*effort)));
+            let of_whole = coarser.map(|_| Choice::new(whole, SearchPlan::votes(*effort)));
+            let windows = windows.of(field).iter().map(|window| Choice {
+                window: Some(window),
+                ..Choice::new(of(&window.field), SearchPlan::window(*effort))
+            });
             let thinned = thinning.thin(field);
-            let thinned = thinned.map(|field| (of(field), SearchPlan::other_stars(*effort)));
+            let other_stars = SearchPlan::other_stars(*effort);
+            let thinned = thinned.map(|field| Choice::new(of(field), other_stars));
             let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| {
                 let problem = Problem {
                     brighter: tier.brighter,
                     ..of(&tier.field)
                 };
-                (problem, SearchPlan::tier(*effort))
+                Choice::new(problem, SearchPlan::tier(*effort))
             });
-            let choices = coarse.chain(of_whole).chain(thinned).chain(tiers);
-            for (problem, plan) in choices {
-                search = search.again(problem, plan, priors);
-                found = search.run();
+            let choices = coarse
+                .chain(of_whole)
+                .chain(windows)
+                .chain(thinned)
+                .chain(tiers);
+            for choice in choices {
+                (search, found) = choice.search(search, whole, priors);
                 let log10 = search.best_log10_false_alarm();
                 best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
                 if found.is_some() || search.is_interrupted() {
@@ -251,6 +265,44 @@ impl Workspace {
             bright,
             answer,
         })
+    }
+}
+
+/// What else is searched where the brightest stars of a field do not identify it.
+struct Choice<'a> {
+    problem: Problem<'a>,
+    plan: SearchPlan,
+    /// The window of the frame that it is.
+    window: Option<&'a Window>,
+}
+
+impl<'a> Choice<'a> {
+    fn new(problem: Problem<'a>, plan: SearchPlan) -> Self {
+        Self {
+            problem,
+            plan,
+            window: None,
+        }
+    }
+
+    /// Searches it, after `search`, for the pointing of the `whole` frame.
+    fn search(
+        &self,
+        search: Search<'a>,
+        whole: Problem<'a>,
+        priors: &Priors,
+    ) -> (Search<'a>, Option<Found>) {
+        let Some(window) = self.window else {
+            let mut search = search.again(self.problem, self.plan, priors);
+            let found = search.run();
+            return (search, found);
+        };
+        let of_window = window.priors(priors, whole.field.width_px);
+        let mut search = search.again(self.problem, self.plan, &of_window);
+        match search.run() {
+            Some(found) => search.follow(window, &found, whole, priors),
+            None => (search, None),
+        }
     }
 }
 
@@ -417,7 +469,7 @@ fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) 
         ),
         sceptical: false,
         stars,
-        richest: DistortionModel::Quintic,
+        richest: DistortionModel::Irregular5,
     };
     search.refiner().refine(problem, &start)
 }
@@ -456,6 +508,32 @@ fn star_match(pair: &Pair, field: &StarField) -> StarMatch {
     }
 }
 
+/// The camera, without the part of the frame where an all-sky lens has shown no stars.
+fn known_part(
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    matches: &[StarMatch],
+) -> CameraModel {
+    /// Stars may be this much farther from the axis than the outermost that is named, in radians; and
+    /// where that is nearly in the corners, everywhere.
+    const MARGIN_RAD: f64 = RAD_PER_DEG;
+    const NEARLY: f64 = 0.9;
+    if camera.is_pinhole() {
+        return *camera;
+    }
+    let angle_rad = |star: &StarMatch| {
+        let direction = icrs_to_camera.apply(&star.light);
+        direction.angle_to(&UnitVector::BORESIGHT)
+    };
+    let outermost_rad = matches.iter().map(angle_rad).fold(0.0, f64::max);
+    let corners_rad = camera.radius_rad();
+    if outermost_rad > NEARLY * corners_rad {
+        camera.limited_to(corners_rad)
+    } else {
+        camera.limited_to(outermost_rad + MARGIN_RAD)
+    }
+}
+
 fn identification(
     refined: &Refined,
     log10_false_alarm: f64,
@@ -466,8 +544,8 @@ fn identification(
     let sum_sq: f64 = matches.iter().map(|m| m.residual_px.powi(2)).sum();
     Identification {
         attitude_covariance_rad2: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
-        focal_length_sigma_px: covariance[(3, 3)].sqrt() * fit.camera.focal_length_px,
-        camera: fit.camera,
+        focal_length_sigma_px: covariance[(3, 3)].sqrt() * fit.camera.central_focal_length_px(),
+        camera: known_part(&fit.camera, &fit.icrs_to_camera, &matches),
         icrs_to_camera: fit.icrs_to_camera,
         excess_sigma_px: refined.excess_sigma_px,
         rms_px: (sum_sq / matches.len().max(1) as f64).sqrt(),

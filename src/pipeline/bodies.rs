@@ -49,7 +49,8 @@ pub(super) fn find_bodies(
     found.matches.retain(|named| {
         let position = &sources[named.source.get()].position;
         let is_body = |body: &BodyInFrame| {
-            body.source == Some(named.source) || body.hides(position, found.camera.focal_length_px)
+            body.source == Some(named.source)
+                || body.hides(position, found.camera.focal_length_px())
         };
         !bodies.iter().any(is_body)
     });
@@ -111,7 +112,7 @@ impl<'a> Field<'a> {
         /// Residuals have wide tails, and what is saturated and bloomed has a poor centroid.
         const RESIDUALS: f64 = 3.0;
         const BLOOMED_PX: f64 = 4.0;
-        let disc_px = expected.body.radius_rad * self.found.camera.focal_length_px;
+        let disc_px = expected.body.radius_rad * self.found.camera.focal_length_px();
         expected.uncertainty_px + disc_px + RESIDUALS * self.found.rms_px + BLOOMED_PX
     }
 

@@ -23,11 +23,11 @@ impl BodyInFrame {
     pub(super) fn expected(body: Body, found: &Identification) -> Option<Self> {
         let camera = &found.camera;
         let position = camera.pixel_of(&found.icrs_to_camera.apply(&body.direction))?;
-        let disc_px = body.radius_rad * camera.focal_length_px;
+        let disc_px = body.radius_rad * camera.focal_length_px();
         camera.nearly_contains(&position, disc_px).then_some(Self {
             body,
             position,
-            uncertainty_px: body.uncertainty_rad * camera.focal_length_px,
+            uncertainty_px: body.uncertainty_rad * camera.focal_length_px(),
             source: None,
         })
     }

@@ -166,7 +166,7 @@ impl Note {
         let scale = dropped.filter(|scale| scale.source == ScaleSource::Header)?;
         let found = outcome.identification()?;
         let [low_rad, high_rad] = scale.pixel_scale_range_rad(found.camera.width_px);
-        let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px));
+        let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px()));
         is_wrong.then_some(Self::WrongHeaderScale {
             pixel_scale_rad: [low_rad, high_rad],
         })

@@ -97,7 +97,7 @@ impl SolvedFrame<'_> {
             vignetting: self.stated_vignetting(),
             wings: self.detections.wings.map_or(0.0, |wings| wings.share),
             spot_sigma_px: found.map(|_| spot_sigma_px),
-            pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px),
+            pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px()),
             zenith_distance_deg: self.observation.as_ref().map(zenith_distance_deg),
             header_zenith_distance_deg: self.frame.metadata.zenith_distance_deg,
             zero_point_vmag: zero_point.map(|zero| Estimate {

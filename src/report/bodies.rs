@@ -13,7 +13,7 @@ pub(super) fn add_to(
     bodies: &[BodyInFrame],
     identification: &Identification,
 ) {
-    let focal_px = identification.camera.focal_length_px;
+    let focal_px = identification.camera.focal_length_px();
     report.bodies = bodies.iter().map(|seen| body(seen, focal_px)).collect();
     for body in &report.bodies {
         if let Some(star) = body.detection.and_then(|index| report.stars.get_mut(index)) {

@@ -17,7 +17,7 @@ use crate::base::format::{
 };
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
-use crate::camera::Distortion;
+use crate::camera::CameraModel;
 use crate::identify::{FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::MagnitudeBin;
@@ -112,6 +112,7 @@ impl FrameReport {
         self.attitude = Some(attitude(
             &identification.icrs_to_camera,
             &identification.attitude_covariance_rad2,
+            boresight_of(&identification.camera),
         ));
         self.optics = Some(optics(identification));
         self.matched = Some(match_quality(identification, self.stars.len()));
@@ -169,6 +170,7 @@ fn observation(seen: &Observation) -> ObservationReport {
 pub(super) fn attitude(
     icrs_to_camera: &Rotation<Icrs, Camera>,
     covariance_rad2: &Matrix3<f64>,
+    at: &'static str,
 ) -> AttitudeReport {
     let (boresight, up_pa_rad) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
@@ -178,6 +180,7 @@ pub(super) fn attitude(
     };
     let [x, y, roll] = [0, 1, 2].map(sigma);
     AttitudeReport {
+        at,
         ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         dec_deg: to_decimals(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
@@ -186,30 +189,46 @@ pub(super) fn attitude(
     }
 }
 
-fn optics(identification: &Identification) -> OpticsReport {
-    let camera = &identification.camera;
-    OpticsReport {
-        fov_x_deg: to_decimals(camera.fov_x_rad() * DEG_PER_RAD, 6),
-        fov_y_deg: to_decimals(camera.fov_y_rad() * DEG_PER_RAD, 6),
-        focal_length_px: to_decimals(camera.focal_length_px, PIXEL_DECIMALS),
-        focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
-        mirrored: camera.mirrored,
-        distortion: camera.distortion.as_ref().map(distortion),
+/// What the boresight of a camera is.
+pub(super) fn boresight_of(camera: &CameraModel) -> &'static str {
+    if camera.is_pinhole() {
+        "centre"
+    } else {
+        "axis"
     }
 }
 
-pub(super) fn distortion(distortion: &Distortion) -> DistortionReport {
+fn optics(identification: &Identification) -> OpticsReport {
+    let camera = &identification.camera;
+    let axis = camera.axis();
+    let degrees = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 6);
+    OpticsReport {
+        fov_x_deg: camera.fov_x_rad().map(degrees),
+        fov_y_deg: camera.fov_y_rad().map(degrees),
+        model: camera.projection().name(),
+        focal_length_px: to_decimals(camera.central_focal_length_px(), PIXEL_DECIMALS),
+        focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
+        mirrored: camera.mirrored,
+        axis_px: [axis.x, axis.y].map(|along| to_decimals(along, PIXEL_DECIMALS)),
+        valid_to_deg: (!camera.is_pinhole()).then(|| degrees(camera.max_angle_rad())),
+        distortion: distortion(camera),
+    }
+}
+
+pub(super) fn distortion(camera: &CameraModel) -> Option<DistortionReport> {
+    let distortion = camera.distortion()?;
     let coefficients = distortion.coefficients_px().iter();
-    DistortionReport {
+    Some(DistortionReport {
         model: distortion.model().name(),
+        focal_length_px: to_decimals(camera.focal_length_px(), PIXEL_DECIMALS),
         radius_px: to_decimals(distortion.radius_px(), PIXEL_DECIMALS),
         largest_px: to_decimals(distortion.largest_px(), PIXEL_DECIMALS),
         coefficients_px: coefficients.map(|c| to_decimals(*c, 6)).collect(),
-    }
+    })
 }
 
 fn match_quality(identification: &Identification, detected: usize) -> MatchReport {
-    let pixel_arcsec = ARCSEC_PER_RAD / identification.camera.focal_length_px;
+    let pixel_arcsec = ARCSEC_PER_RAD / identification.camera.central_focal_length_px();
     MatchReport {
         detected,
         matched: identification.matches.len(),

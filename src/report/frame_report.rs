@@ -136,6 +136,8 @@ pub enum Status {
 /// The attitude of the camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AttitudeReport {
+    /// What it is the attitude of: the frame's `centre`, or the `axis` of a lens that is no pinhole.
+    pub at: &'static str,
     /// Right ascension of the frame's centre, in degrees, in [0, 360).
     pub ra_deg: f64,
     /// Declination of the frame's centre, in degrees.
@@ -163,16 +165,26 @@ pub struct AttitudeSigma {
 /// The fitted camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OpticsReport {
-    /// Angle between the middles of the left and right borders, in degrees.
-    pub fov_x_deg: f64,
+    /// Angle between the middles of the left and right borders, in degrees; none where one of them does
+    /// not see the sky.
+    pub fov_x_deg: Option<f64>,
     /// Angle between the middles of the upper and lower borders, in degrees.
-    pub fov_y_deg: f64,
-    /// Focal length over pixel pitch.
+    pub fov_y_deg: Option<f64>,
+    /// Name of the [`Projection`](crate::camera::Projection).
+    pub model: &'static str,
+    /// Focal length over pixel pitch: 1 / the scale in radians per pixel at the frame's centre of a
+    /// pinhole, and on the axis of another lens.
     pub focal_length_px: f64,
     /// Standard error of the focal length, in pixels.
     pub focal_length_sigma_px: Option<f64>,
     /// Whether the image is a mirror image of the sky.
     pub mirrored: bool,
+    /// The pixel on the axis of the lens, [x, y]: the centre of the frame where the stars do not say
+    /// otherwise.
+    pub axis_px: [f64; 2],
+    /// Angle from the axis, in degrees, to which the lens is known; none where it is known all over the
+    /// frame.
+    pub valid_to_deg: Option<f64>,
     /// Distortion, where it is significant.
     pub distortion: Option<DistortionReport>,
 }
@@ -182,9 +194,11 @@ pub struct OpticsReport {
 pub struct DistortionReport {
     /// Name of the [`DistortionModel`](crate::camera::DistortionModel).
     pub model: &'static str,
+    /// Focal length on the axis of the lens, in pixels.
+    pub focal_length_px: f64,
     /// Radius at which a normalised offset is 1, in pixels.
     pub radius_px: f64,
-    /// Largest displacement at that radius, in pixels.
+    /// Largest displacement at that radius, without that of the axis, in pixels.
     pub largest_px: f64,
     /// The coefficients in pixels, in the model's order.
     pub coefficients_px: Vec<f64>,

@@ -48,8 +48,9 @@ impl ReportedPointing<'_> {
         for star in stars.iter_mut() {
             let to_icrs = self.identification.icrs_to_camera.inverse();
             let pixel = PixelPoint::new(star.x, star.y);
-            let direction = self.identification.camera.direction_of(&pixel);
-            star.set_direction(&to_icrs.apply(&direction));
+            if let Some(direction) = self.identification.camera.direction_of(&pixel) {
+                star.set_direction(&to_icrs.apply(&direction));
+            }
         }
         for star_match in &self.identification.matches {
             if let Some(star) = stars.get_mut(star_match.source.get()) {

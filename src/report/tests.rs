@@ -128,6 +128,20 @@ fn photometry() -> PhotometryReport {
     }
 }
 
+fn optics() -> OpticsReport {
+    OpticsReport {
+        fov_x_deg: Some(20.012_345),
+        fov_y_deg: Some(15.081_234),
+        model: "pinhole",
+        axis_px: [511.5, 383.5],
+        valid_to_deg: None,
+        focal_length_px: 2902.1234,
+        focal_length_sigma_px: Some(0.3123),
+        mirrored: false,
+        distortion: None,
+    }
+}
+
 fn identified() -> FrameReport {
     FrameReport {
         date: Some(DateReport {
@@ -162,6 +176,7 @@ fn identified() -> FrameReport {
         reason_code: None,
         remedies: Vec::new(),
         attitude: Some(AttitudeReport {
+            at: "centre",
             ra_deg: 83.822_083_3,
             dec_deg: -1.212_251_2,
             up_pa_deg: 12.345_678_9,
@@ -172,14 +187,7 @@ fn identified() -> FrameReport {
                 roll: 31.51,
             },
         }),
-        optics: Some(OpticsReport {
-            fov_x_deg: 20.012_345,
-            fov_y_deg: 15.081_234,
-            focal_length_px: 2902.1234,
-            focal_length_sigma_px: Some(0.3123),
-            mirrored: false,
-            distortion: None,
-        }),
+        optics: Some(optics()),
         matched: Some(MatchReport {
             detected: 3,
             matched: 2,

@@ -211,12 +211,13 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     } else {
         "not mirrored"
     };
+    let field = match (optics.fov_x_deg.zip(optics.fov_y_deg), optics.valid_to_deg) {
+        (Some((x, y)), _) => format!("{x:.3}° × {y:.3}°"),
+        (None, to_deg) => format!("{:.1}° around the axis", to_deg.unwrap_or(f64::NAN)),
+    };
     let mut lines = vec![labelled(
         "field",
-        &format!(
-            "{:.3}° × {:.3}°, {pixel_arcsec:.3}″ a pixel, {focal} px, {mirrored}",
-            optics.fov_x_deg, optics.fov_y_deg
-        ),
+        &format!("{field}, {pixel_arcsec:.3}″ a pixel, {focal} px, {mirrored}",),
     )];
     let distortion = match &optics.distortion {
         None => "none measurable".to_owned(),

@@ -122,6 +122,8 @@ impl TrackReport {
         };
         let (rate_deg_s, rate_sigma_deg_s) = rate(false).unzip();
         let (rate_deg_frame, rate_sigma_deg_frame) = rate(true).unzip();
+        let camera = track.camera.as_ref();
+        let at = camera.map_or("centre", |(camera, _)| build::boresight_of(camera));
         Self {
             schema: SCHEMA,
             frame: frame.to_owned(),
@@ -130,7 +132,7 @@ impl TrackReport {
             reason,
             reason_code,
             not_tracked: track.loss.as_ref().map(not_tracked),
-            attitude: track.attitude.as_ref().map(attitude),
+            attitude: track.attitude.as_ref().map(|found| attitude(found, at)),
             rate_deg_s,
             rate_sigma_deg_s,
             rate_deg_frame,
@@ -217,22 +219,22 @@ fn not_tracked(loss: &Loss) -> NotTrackedReport {
     }
 }
 
-fn attitude(found: &Attitude) -> TrackAttitudeReport {
+fn attitude(found: &Attitude, at: &'static str) -> TrackAttitudeReport {
     let covariance = found.covariance_rad2 * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
     let element =
         |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
     TrackAttitudeReport {
-        attitude: build::attitude(&found.icrs_to_camera, &found.covariance_rad2),
+        attitude: build::attitude(&found.icrs_to_camera, &found.covariance_rad2, at),
         covariance_arcsec2: [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column))),
     }
 }
 
 fn optics(camera: &CameraModel, focal_sigma_px: f64) -> TrackOpticsReport {
     TrackOpticsReport {
-        focal_length_px: to_decimals(camera.focal_length_px, PIXEL_DECIMALS),
+        focal_length_px: to_decimals(camera.central_focal_length_px(), PIXEL_DECIMALS),
         focal_length_sigma_px: finite(focal_sigma_px, PIXEL_DECIMALS),
         mirrored: camera.mirrored,
-        distortion: camera.distortion.as_ref().map(build::distortion),
+        distortion: build::distortion(camera),
     }
 }
 

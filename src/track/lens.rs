@@ -7,8 +7,8 @@
 //! changes with its temperature.
 
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::camera::{CameraModel, Distortion};
-use crate::identify::fit::MeasuredStar;
+use crate::camera::{CameraModel, Distortion, DistortionModel, MAX_TERMS};
+use crate::identify::fit::{MeasuredStar, Prediction, Predictor};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 /// Parameters of the attitude.
@@ -34,8 +34,6 @@ pub(super) struct LensRefiner {
     right: DVector<f64>,
     /// One equation.
     row: DVector<f64>,
-    /// Each term of the distortion alone, with the coefficient 1 px.
-    terms: Vec<Distortion>,
     scratch: DMatrix<f64>,
     step: DVector<f64>,
 }
@@ -43,19 +41,18 @@ pub(super) struct LensRefiner {
 impl LensRefiner {
     /// Begins with a camera, of whose parameters nothing is taken as known.
     pub fn new(camera: CameraModel) -> Self {
-        let terms = camera.distortion.as_ref().map_or(Vec::new(), terms_of);
-        let count = 1 + terms.len();
+        let terms = camera.distortion_model().map_or(0, DistortionModel::terms);
+        let count = 1 + terms;
         let mut information = DMatrix::identity(count, count) * UNKNOWN_PX.powi(-2);
         information[(0, 0)] = UNKNOWN_LN_FOCAL.powi(-2);
         let all = ATTITUDE + count;
         Self {
             camera,
-            focal_sigma_px: UNKNOWN_LN_FOCAL * camera.focal_length_px,
+            focal_sigma_px: UNKNOWN_LN_FOCAL * camera.focal_length_px(),
             information,
             normal: DMatrix::zeros(all, all),
             right: DVector::zeros(all),
             row: DVector::zeros(all),
-            terms,
             scratch: DMatrix::zeros(count, count),
             step: DVector::zeros(count),
         }
@@ -81,8 +78,10 @@ impl LensRefiner {
     ) {
         self.normal.fill(0.0);
         self.right.fill(0.0);
+        let model = self.camera.distortion_model();
+        let predictor = Predictor::new(&self.camera, icrs_to_camera, model);
         for star in stars {
-            self.add_star(&star, icrs_to_camera, excess_px);
+            self.add_star(&star, &predictor, excess_px);
         }
         if self.add_information().is_some() {
             self.take_step();
@@ -90,32 +89,22 @@ impl LensRefiner {
     }
 
     /// Adds the two equations of a star.
-    fn add_star(
-        &mut self,
-        star: &MeasuredStar,
-        icrs_to_camera: &Rotation<Icrs, Camera>,
-        excess_px: f64,
-    ) {
-        let direction = icrs_to_camera.apply(&star.icrs);
-        let d = direction.as_vector();
-        if d.z <= 0.0 {
+    fn add_star(&mut self, star: &MeasuredStar, predictor: &Predictor, excess_px: f64) {
+        let Some(prediction) = predictor.predict(star) else {
             return;
-        }
-        let focal_px = self.camera.focal_length_px;
-        let [x, y] = [d.x / d.z, d.y / d.z];
+        };
+        let Prediction {
+            by_pose, observed, ..
+        } = &prediction;
         let offset = self.camera.offset_of(&star.pixel);
-        let ideal = self.camera.ideal_offset_of(&star.pixel);
-        let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
         let weight = 1.0 / star.sigma_px.hypot(excess_px);
         for axis in 0..2 {
-            for (parameter, by) in pose[axis].iter().enumerate() {
-                self.row[parameter] = weight * focal_px * by;
+            let of_monomials = prediction.monomials_along(axis);
+            let by_parameters = by_pose[axis].into_iter().chain(observed.by_term[axis]);
+            for (entry, by) in self.row.iter_mut().zip(by_parameters.chain(of_monomials)) {
+                *entry = weight * by;
             }
-            for (term, distortion) in self.terms.iter().enumerate() {
-                let moved = distortion.remove(offset)[axis] - offset[axis];
-                self.row[ATTITUDE + 1 + term] = -weight * moved;
-            }
-            let residual = weight * (ideal[axis] - focal_px * [x, y][axis]);
+            let residual = weight * (offset[axis] - observed.at[axis]);
             self.normal.syger(1.0, &self.row, &self.row, 1.0);
             self.right.axpy(residual, &self.row, 1.0);
         }
@@ -156,49 +145,33 @@ impl LensRefiner {
         };
         root.solve_mut(&mut self.step);
         if self.step[0].abs() < MAX_STEP && self.step.iter().all(|step| step.is_finite()) {
-            self.camera.focal_length_px *= self.step[0].exp();
-            if let Some(distortion) = self.camera.distortion {
-                let mut coefficients_px = [0.0; crate::camera::DistortionModel::Quintic.terms()];
+            let focal_length_px = self.camera.focal_length_px() * self.step[0].exp();
+            let distortion = self.camera.distortion().map(|distortion| {
+                let mut coefficients_px = [0.0; MAX_TERMS];
                 let known = distortion.coefficients_px();
-                for ((new, old), step) in coefficients_px
-                    .iter_mut()
-                    .zip(known)
-                    .zip(self.step.iter().skip(1))
-                {
+                let steps = self.step.iter().skip(1);
+                for ((new, old), step) in coefficients_px.iter_mut().zip(known).zip(steps) {
                     *new = old + step;
                 }
-                self.camera.distortion = Some(Distortion::new(
-                    distortion.model(),
-                    distortion.radius_px(),
-                    &coefficients_px[..known.len()],
-                ));
-            }
+                let coefficients_px = &coefficients_px[..known.len()];
+                Distortion::new(distortion.model(), distortion.radius_px(), coefficients_px)
+            });
+            let camera = self.camera.with_focal_length(focal_length_px);
+            self.camera = camera.with_distortion(distortion);
         }
         // The first column of the inverse, for the variance of ln f.
         self.step.fill(0.0);
         self.step[0] = 1.0;
         root.solve_mut(&mut self.step);
-        self.focal_sigma_px = self.step[0].max(0.0).sqrt() * self.camera.focal_length_px;
+        self.focal_sigma_px = self.step[0].max(0.0).sqrt() * self.camera.focal_length_px();
         self.scratch = root.unpack_dirty();
     }
-}
-
-/// Each term of a distortion alone, with the coefficient 1 px.
-fn terms_of(distortion: &Distortion) -> Vec<Distortion> {
-    let count = distortion.coefficients_px().len();
-    let term = |term: usize| {
-        let mut coefficients_px = vec![0.0; count];
-        coefficients_px[term] = 1.0;
-        Distortion::new(distortion.model(), distortion.radius_px(), &coefficients_px)
-    };
-    (0..count).map(term).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
-    use crate::camera::DistortionModel;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -206,10 +179,10 @@ mod tests {
     const SIGMA_PX: f64 = 0.05;
 
     fn camera(focal_px: f64, coefficients_px: &[f64]) -> CameraModel {
-        let mut camera = CameraModel::pinhole(640.0, 480.0, focal_px, false);
+        let camera = CameraModel::pinhole(640.0, 480.0, focal_px, false);
         let model = DistortionModel::Radial5;
-        camera.distortion = Some(Distortion::new(model, camera.radius_px(), coefficients_px));
-        camera
+        let distortion = Distortion::new(model, camera.radius_px(), coefficients_px);
+        camera.with_distortion(Some(distortion))
     }
 
     #[test]
@@ -226,7 +199,9 @@ mod tests {
                 let star = |_| {
                     let (x, y) = (rng.random_range(0.0..640.0), rng.random_range(0.0..480.0));
                     let place = PixelPoint::new(x, y);
-                    let icrs = attitude.inverse().apply(&truth.direction_of(&place));
+                    let icrs = attitude
+                        .inverse()
+                        .apply(&truth.direction_of(&place).unwrap());
                     let mut error = || SIGMA_PX * rng.sample::<f64, _>(StandardNormal);
                     MeasuredStar {
                         pixel: PixelPoint::new(x + error(), y + error()),
@@ -239,16 +214,13 @@ mod tests {
                 let turned = attitude.then_turn(Vector3::new(1e-5, -2e-5, 3e-5));
                 lens.add(stars.into_iter(), &turned, 0.0);
             }
-            let error_px = lens.camera().focal_length_px - 1800.0;
+            let error_px = lens.camera().focal_length_px() - 1800.0;
             squares += (error_px / lens.focal_sigma_px()).powi(2) / RUNS as f64;
             last_sigma_px = lens.focal_sigma_px();
             let corner = PixelPoint::new(630.0, 470.0);
-            let found = lens.camera().ideal_offset_of(&corner);
-            let expected = truth.ideal_offset_of(&corner);
-            assert!(
-                (found[0] - expected[0]).abs() < 0.3,
-                "{found:?} {expected:?}"
-            );
+            let there = truth.direction_of(&corner).unwrap();
+            let found = lens.camera().pixel_of(&there).unwrap();
+            assert!(found.distance_to(&corner) < 0.3, "{found:?}");
         }
         assert!(last_sigma_px < 0.15, "{last_sigma_px}");
         // The standard error of the mean square of forty is 0.22.

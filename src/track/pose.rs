@@ -59,11 +59,11 @@ pub(super) struct PoseFitter {
 impl PoseFitter {
     /// The attitude that fits most of the stars; `None` where fewer than [`MIN_STARS`] agree.
     pub fn fit(&mut self, stars: &[PoseStar], prior: &PosePrior) -> Option<Attitude> {
-        let pinhole = self.straighten(stars, prior);
+        let plain = self.straighten(stars, prior);
         if stars.len() < MIN_STARS {
             return None;
         }
-        self.choose_first(&pinhole, prior.icrs_to_camera);
+        self.choose_first(&plain, prior.icrs_to_camera);
         let mut start = *prior.icrs_to_camera;
         let mut attitude = None;
         for _ in 0..MAX_ROUNDS {
@@ -74,12 +74,12 @@ impl PoseFitter {
             if self.fitted.len() < MIN_STARS {
                 return None;
             }
-            let fit = fit_camera(&self.fitted, &pinhole, &start, None, &mut self.of_fit_px)?;
+            let fit = fit_camera(&self.fitted, &plain, &start, None, &mut self.of_fit_px)?;
             let found = with_known_focal_length(&fit, prior);
             start = found.icrs_to_camera;
             attitude = Some(found);
             std::mem::swap(&mut self.is_used, &mut self.before);
-            self.set_residuals(&pinhole, &start);
+            self.set_residuals(&plain, &start);
             self.choose(clip_px);
             if self.is_used == self.before {
                 break;
@@ -136,28 +136,25 @@ impl PoseFitter {
 
     /// Removes the distortion from the stars; returns the camera without it.
     fn straighten(&mut self, stars: &[PoseStar], prior: &PosePrior) -> CameraModel {
-        let pinhole = CameraModel {
-            distortion: None,
-            ..*prior.camera
-        };
-        let centre = pinhole.centre();
+        let plain = prior.camera.with_distortion(None);
+        // A star that the lens does not image was not predicted.
         let straight = |star: &PoseStar| {
-            let [u, v] = prior.camera.ideal_offset_of(&star.position);
-            let u = if pinhole.mirrored { -u } else { u };
+            let direction = prior.camera.direction_of(&star.position);
+            let pixel = direction.and_then(|direction| plain.pixel_of(&direction));
             MeasuredStar {
-                pixel: PixelPoint::new(centre.x + u, centre.y + v),
+                pixel: pixel.unwrap_or(star.position),
                 icrs: star.direction,
                 sigma_px: star.sigma_px.hypot(prior.excess_px),
             }
         };
         self.ideal.clear();
         self.ideal.extend(stars.iter().map(straight));
-        pinhole
+        plain
     }
 
     /// Chooses the stars that are shifted from their predicted places as most are.
-    fn choose_first(&mut self, pinhole: &CameraModel, icrs_to_camera: &Rotation<Icrs, Camera>) {
-        self.set_residuals(pinhole, icrs_to_camera);
+    fn choose_first(&mut self, plain: &CameraModel, icrs_to_camera: &Rotation<Icrs, Camera>) {
+        self.set_residuals(plain, icrs_to_camera);
         let shift = [0, 1].map(|axis: usize| {
             self.scratch.clear();
             let along = self.residuals_px.iter().map(|residual| residual[axis]);
@@ -179,13 +176,15 @@ impl PoseFitter {
     }
 
     /// Sets the residuals of all stars.
-    fn set_residuals(&mut self, pinhole: &CameraModel, icrs_to_camera: &Rotation<Icrs, Camera>) {
-        let focal_px = pinhole.focal_length_px;
+    fn set_residuals(&mut self, plain: &CameraModel, icrs_to_camera: &Rotation<Icrs, Camera>) {
         let residual = |star: &MeasuredStar| {
             let direction = icrs_to_camera.apply(&star.icrs);
-            let d = direction.as_vector();
-            let [u, v] = pinhole.offset_of(&star.pixel);
-            [u - focal_px * d.x / d.z, v - focal_px * d.y / d.z]
+            let [u, v] = plain.offset_of(&star.pixel);
+            let predicted = plain.pixel_of(&direction);
+            predicted.map_or([f64::INFINITY; 2], |predicted| {
+                let [along_u, along_v] = plain.offset_of(&predicted);
+                [u - along_u, v - along_v]
+            })
         };
         self.residuals_px.clear();
         self.residuals_px.extend(self.ideal.iter().map(residual));
@@ -206,11 +205,11 @@ fn clip_px(star: &MeasuredStar) -> f64 {
 
 /// The attitude of a fit with a free focal length, which is known better: both are combined.
 fn with_known_focal_length(fit: &CameraFit, prior: &PosePrior) -> Attitude {
-    let known_px = prior.camera.focal_length_px;
+    let known_px = prior.camera.focal_length_px();
     let variance = (prior.focal_sigma_px / known_px).powi(2);
     let with_focal: Vector4<f64> = fit.covariance.column(3).into_owned();
     let gain = with_focal / (variance + with_focal[3]);
-    let off = (known_px / fit.camera.focal_length_px).ln();
+    let off = (known_px / fit.camera.focal_length_px()).ln();
     let turn = gain.fixed_rows::<3>(0) * off;
     let covariance = fit.covariance - gain * with_focal.transpose();
     Attitude {
@@ -232,17 +231,16 @@ mod tests {
     const SIGMA_PX: f64 = 0.05;
 
     fn camera() -> CameraModel {
-        let mut camera = CameraModel::pinhole(640.0, 480.0, 1800.0, true);
+        let camera = CameraModel::pinhole(640.0, 480.0, 1800.0, true);
         let radial = Distortion::new(DistortionModel::Radial, camera.radius_px(), &[3.0]);
-        camera.distortion = Some(radial);
-        camera
+        camera.with_distortion(Some(radial))
     }
 
     fn stars(truth: &Rotation<Icrs, Camera>, rng: &mut ChaCha8Rng) -> Vec<PoseStar> {
         let camera = camera();
         let star = |_| {
             let place = PixelPoint::new(rng.random_range(9.0..630.0), rng.random_range(9.0..470.0));
-            let direction = truth.inverse().apply(&camera.direction_of(&place));
+            let direction = truth.inverse().apply(&camera.direction_of(&place).unwrap());
             let mut error = || SIGMA_PX * rng.sample::<f64, _>(StandardNormal);
             PoseStar {
                 position: PixelPoint::new(place.x + error(), place.y + error()),

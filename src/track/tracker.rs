@@ -234,7 +234,7 @@ impl<'a> Tracker<'a> {
         if was_counted != clock.is_counted {
             return Err(Loss::NotLater);
         }
-        let typical_rad = TYPICAL_ERROR_PX / camera.focal_length_px;
+        let typical_rad = TYPICAL_ERROR_PX / camera.focal_length_px();
         let prediction = known
             .motion
             .predict(clock.time, typical_rad)
@@ -301,7 +301,7 @@ impl<'a> Tracker<'a> {
             let is_free = |scale: &ScalePrior| !scale.is_binding();
             if context.priors.scale.as_ref().is_none_or(is_free) {
                 context.priors.scale = Some(ScalePrior {
-                    scale: Scale::Pixel(1.0 / known.lens.camera().focal_length_px),
+                    scale: Scale::Pixel(1.0 / known.lens.camera().focal_length_px()),
                     tolerance: SCALE_TOLERANCE,
                     source: ScaleSource::Camera,
                 });
@@ -406,20 +406,20 @@ impl TrackerState {
     /// Whether an identification is of the same camera.
     fn is_of(&self, found: &Identification) -> bool {
         let (camera, other) = (self.lens.camera(), &found.camera);
-        let apart_px = (camera.focal_length_px - other.focal_length_px).abs();
+        let apart_px = (camera.focal_length_px() - other.focal_length_px()).abs();
         let sigma_px = self
             .lens
             .focal_sigma_px()
             .hypot(found.focal_length_sigma_px);
         // Models of distortion differ in their scale at the centre.
-        let models_px = 1e-3 * camera.focal_length_px;
+        let models_px = 1e-3 * camera.focal_length_px();
         [camera.width_px, camera.height_px] == [other.width_px, other.height_px]
             && camera.mirrored == other.mirrored
             && apart_px < OTHER_CAMERA_SIGMAS * sigma_px + models_px
     }
 
     fn continued_motion(&self, clock: Clock, attitude: &Attitude) -> Option<AttitudeMotion> {
-        let typical_rad = TYPICAL_ERROR_PX / self.lens.camera().focal_length_px;
+        let typical_rad = TYPICAL_ERROR_PX / self.lens.camera().focal_length_px();
         let mut motion = self.motion;
         let prediction = motion.predict(clock.time, typical_rad)?;
         motion.update(&prediction, attitude, typical_rad);
@@ -445,12 +445,13 @@ impl TrackerState {
         let mut stars: Vec<_> = alone.collect();
         stars.sort_by(|a, b| b.flux.unwrap_or(0.0).total_cmp(&a.flux.unwrap_or(0.0)));
         let with_path = |position: PixelPoint| {
-            let direction = camera.direction_of(&position);
+            let direction = camera.direction_of(&position)?;
             let direction = attitude.icrs_to_camera.inverse().apply(&direction);
             let smear_px = smear_px(camera, &attitude.icrs_to_camera, &direction, turn_rad);
-            (position, smear_px)
+            Some((position, smear_px))
         };
-        stars.iter().map(|star| with_path(star.position)).collect()
+        let stars = stars.iter();
+        stars.filter_map(|star| with_path(star.position)).collect()
     }
 
     /// The stars that can be tracked.
@@ -460,7 +461,7 @@ impl TrackerState {
         let highest_adu = MAX_PEAK * f64::from(light.saturation_adu) - light.background_adu;
         let most_flux_adu = highest_adu.max(1.0) / spot.peak_share();
         let brightest = light.zero_point_mag + instrumental_mag(most_flux_adu);
-        let rad_per_px = 1.0 / self.lens.camera().focal_length_px;
+        let rad_per_px = 1.0 / self.lens.camera().focal_length_px();
         let width_px = spot.width_px([0.0; 2]);
         let still = ExpectedStar {
             position: PixelPoint::default(),
@@ -562,7 +563,7 @@ struct PredictedView<'a> {
 impl PredictedView<'_> {
     /// How far from its predicted place a star may be.
     fn radius_px(&self, place: &PixelPoint) -> f64 {
-        let focal_px = self.camera.focal_length_px;
+        let focal_px = self.camera.focal_length_px();
         let [u, v] = self.camera.offset_of(place);
         let [x, y] = [u / focal_px, v / focal_px];
         let covariance: Matrix3<f64> = self.prediction.attitude_covariance_rad2();
@@ -616,7 +617,7 @@ fn smear_px(
     direction: &UnitVector<Icrs>,
     turn_rad: Vector3<f64>,
 ) -> [f64; 2] {
-    if turn_rad.norm() * camera.focal_length_px < MIN_SMEAR_PX {
+    if turn_rad.norm() * camera.focal_length_px() < MIN_SMEAR_PX {
         return [0.0; 2];
     }
     let at = |part: f64| {

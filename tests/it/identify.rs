@@ -57,7 +57,7 @@ impl Truth {
     /// The magnitude at which the field has about 25 stars, and the positions of stars down to
     /// slightly below it.
     fn places(&self) -> (f64, Vec<(PixelPoint, f64)>) {
-        let fov = self.camera.fov_x_rad() * self.camera.fov_y_rad();
+        let fov = self.camera.solid_angle_sr();
         let limit_mag = sky()
             .magnitude_of_density(25.0 * 1f64.to_radians().powi(2) / fov)
             .min(9.5);
@@ -100,11 +100,11 @@ impl Truth {
     }
 
     fn is_told_by(&self, found: &Identification) -> bool {
-        let fov_rad = self.camera.fov_x_rad();
+        let fov_rad = self.camera.fov_x_rad().unwrap();
         let centre = self.attitude.boresight_and_up().0;
         let off_rad = found.icrs_to_camera.boresight_and_up().0.angle_to(&centre);
         off_rad < CENTRE_TOLERANCE * fov_rad
-            && (found.camera.fov_x_rad() / fov_rad - 1.0).abs() < WIDTH_TOLERANCE
+            && (found.camera.fov_x_rad().unwrap() / fov_rad - 1.0).abs() < WIDTH_TOLERANCE
             && found.camera.mirrored == self.camera.mirrored
     }
 }
@@ -169,13 +169,13 @@ fn a_distortion_of_two_percent_is_measured() {
         let mut truth = Truth::random(&mut rng, fov_deg);
         let radius_px = truth.camera.radius_px();
         let barrel = [0.02 * radius_px];
-        truth.camera.distortion =
-            Some(Distortion::new(DistortionModel::Radial, radius_px, &barrel));
+        let distortion = Distortion::new(DistortionModel::Radial, radius_px, &barrel);
+        truth.camera = truth.camera.with_distortion(Some(distortion));
         let Ok(found) = identify(&truth.observe(&mut rng), &Priors::default(), sky()) else {
             panic!("{fov_deg} deg: not identified");
         };
         assert!(truth.is_told_by(&found), "{found:?}");
-        let largest_px = found.camera.distortion.unwrap().largest_px();
+        let largest_px = found.camera.distortion().unwrap().largest_px();
         assert!(
             (largest_px / (0.02 * radius_px) - 1.0).abs() < 0.1,
             "{largest_px}"
@@ -202,7 +202,7 @@ fn right_priors_help_and_wrong_priors_exclude() {
     let truth = Truth::random(&mut rng, 12.0);
     let stars = truth.observe(&mut rng);
     let centre = truth.attitude.boresight_and_up().0;
-    let scale_rad = 1.0 / truth.camera.focal_length_px;
+    let scale_rad = 1.0 / truth.camera.focal_length_px();
     let right = Priors {
         scale: Some(ScalePrior::between(0.9 * scale_rad, 1.1 * scale_rad)),
         near: Some(SkyRegion {

@@ -318,7 +318,7 @@ fn a_bad_description_is_an_error_of_its_file() {
         ("vignetting = 1.5", "vignetting"),
         ("mirrored = 3", "mirrored"),
         ("spot_form = \"square\"", "spot_form"),
-        ("distortion_px = 900", "the image folds"),
+        ("distortion_px = -900", "the image folds"),
         ("decentring_px = 9", "decentring_px"),
     ] {
         fs::write(&camera, format!("{}\n{line}\n", described.stdout)).unwrap();

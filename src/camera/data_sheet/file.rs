@@ -7,6 +7,7 @@ use super::response::{Response, ResponseError};
 use super::sheet::DataSheet;
 use super::spot_image::{SpotImage, SpotImageError};
 use crate::base::files;
+use crate::camera::Projection;
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::ops::Range;
@@ -240,6 +241,7 @@ impl CameraFile<'_> {
             spot_image: self.spot_image()?,
             imperfections: Imperfections {
                 spot_form: self.spot_form()?,
+                projection: self.projection()?,
                 mirrored: self.mirrored()?,
                 ..Imperfections::default()
             },
@@ -262,7 +264,7 @@ impl CameraFile<'_> {
     fn check_names(&self) -> Result<(), DataSheetError> {
         let numbers = || KEYS.iter().chain(IMPERFECTION_KEYS).map(|key| key.name);
         let names = || {
-            ["name", "spot_form", "spot_file", "mirrored"]
+            ["name", "spot_form", "spot_file", "projection", "mirrored"]
                 .into_iter()
                 .chain(numbers())
         };
@@ -326,6 +328,18 @@ impl CameraFile<'_> {
         form.ok_or_else(|| {
             let names = SpotForm::ALL.map(|form| format!("\"{}\"", form.name()));
             self.invalid("spot_form", value, format!("one of {}", names.join(", ")))
+        })
+    }
+
+    fn projection(&self) -> Result<Projection, DataSheetError> {
+        const KEY: &str = "projection";
+        let Some(value) = self.get(KEY) else {
+            return Ok(Projection::Pinhole);
+        };
+        let projection = value.get_ref().as_str().and_then(Projection::named);
+        projection.ok_or_else(|| {
+            let names = Projection::ALL.map(|projection| format!("\"{}\"", projection.name()));
+            self.invalid(KEY, value, format!("one of {}", names.join(", ")))
         })
     }
 

@@ -1,7 +1,7 @@
 //! Deviations of a real camera from the ideal: the lens, differences between pixels, the form of
 //! spots.
 
-use crate::camera::LENS_TERMS;
+use crate::camera::{LENS_TERMS, Projection};
 
 /// Form of a star's spot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -88,10 +88,15 @@ pub struct Imperfections {
     pub decentring_x_px: f64,
     /// The same along y.
     pub decentring_y_px: f64,
-    /// Detector tilted along x: displacement at the distance of the corner along x, in pixels.
-    pub tilt_x_px: f64,
-    /// The same along y.
-    pub tilt_y_px: f64,
+    /// Where the axis of the lens meets the frame: right of its centre, in pixels.
+    pub axis_x_px: f64,
+    /// The same, below its centre.
+    pub axis_y_px: f64,
+    /// Unequal scales: displacement of a star by a larger scale along x, and a smaller one along y, at
+    /// the distance of the corner, in pixels.
+    pub stretch_px: f64,
+    /// The same of a larger scale along the diagonal from the upper left.
+    pub skew_px: f64,
     /// Standard deviation of the pixels' response to light, relative to its mean.
     #[doc(alias = "PRNU")]
     pub response_sigma: f64,
@@ -142,23 +147,29 @@ pub struct Imperfections {
     pub denoise_px: f64,
     /// The form of a star's spot.
     pub spot_form: SpotForm,
+    /// The ideal lens that the camera's comes closest to.
+    pub projection: Projection,
+    /// Angle from the axis up to which a lens that is no pinhole images the sky, in degrees.
+    pub field_radius_deg: f64,
     /// Whether the image is reversed left to right.
     pub mirrored: bool,
 }
 
 impl Imperfections {
     /// Displacement by each term of the lens, in the order of
-    /// [`DistortionModel::BrownConrady`](crate::camera::DistortionModel::BrownConrady), in pixels,
-    /// outward positive.
+    /// [`DistortionModel::Stretched`](crate::camera::DistortionModel::Stretched), in pixels, outward
+    /// positive.
     pub fn lens_terms_px(&self) -> [f64; LENS_TERMS] {
         [
             self.distortion_px,
             self.distortion5_px,
             self.distortion7_px,
+            self.axis_x_px,
+            self.axis_y_px,
             self.decentring_x_px,
             self.decentring_y_px,
-            self.tilt_x_px,
-            self.tilt_y_px,
+            self.stretch_px,
+            self.skew_px,
         ]
     }
 }
@@ -172,8 +183,10 @@ impl Default for Imperfections {
             distortion7_px: 0.0,
             decentring_x_px: 0.0,
             decentring_y_px: 0.0,
-            tilt_x_px: 0.0,
-            tilt_y_px: 0.0,
+            axis_x_px: 0.0,
+            axis_y_px: 0.0,
+            stretch_px: 0.0,
+            skew_px: 0.0,
             response_sigma: 0.0,
             dark_current_sigma: 0.0,
             hot_pixels_per_mpx: 0.0,
@@ -196,6 +209,8 @@ impl Default for Imperfections {
             tone_gamma: 1.0,
             denoise_px: 0.0,
             spot_form: SpotForm::default(),
+            projection: Projection::Pinhole,
+            field_radius_deg: 90.0,
             mirrored: false,
         }
     }

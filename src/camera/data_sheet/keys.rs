@@ -117,12 +117,18 @@ pub const KEYS: &[Key<DataSheet>] = &[
 const SHARE: Limits = Limits::FromTo(0.0, 1.0);
 /// Displacement by the lens, in pixels.
 const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
+/// Distance of the axis from the frame's centre, in pixels.
+const AXIS_PX: Limits = Limits::FromTo(-20_000.0, 20_000.0);
 /// Length of a spot by aberrations, in pixels.
 const ABERRATION_PX: Limits = Limits::FromTo(-50.0, 50.0);
 
 /// The numbers of the imperfections, all of them optional.
 pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(vignetting in imperfections, SHARE, "share of the light lost in the corners"),
+    key!(field_radius_deg in imperfections,
+        Limits::FromTo(1.0, 110.0),
+        "angle from the axis up to which a lens that is no pinhole images the sky, in degrees"
+    ),
     key!(distortion_px in imperfections,
         DISPLACEMENT_PX,
         "radial distortion of third order: outward displacement of a star in the corner, in pixels"
@@ -137,13 +143,21 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         DISPLACEMENT_PX,
         "decentred lens, along y: displacement at the distance of the corner, in pixels"
     ),
-    key!(tilt_x_px in imperfections,
-        DISPLACEMENT_PX,
-        "detector tilted along x: displacement at the distance of the corner along x, in pixels"
+    key!(axis_x_px in imperfections,
+        AXIS_PX,
+        "where the axis of the lens meets the frame: right of its centre, in pixels"
     ),
-    key!(tilt_y_px in imperfections,
+    key!(axis_y_px in imperfections,
+        AXIS_PX,
+        "where the axis of the lens meets the frame: below its centre, in pixels"
+    ),
+    key!(stretch_px in imperfections,
         DISPLACEMENT_PX,
-        "detector tilted along y: displacement at the distance of the corner along y, in pixels"
+        "larger scale along x than along y: displacement at the distance of the corner, in pixels"
+    ),
+    key!(skew_px in imperfections,
+        DISPLACEMENT_PX,
+        "larger scale along one diagonal: displacement at the distance of the corner, in pixels"
     ),
     key!(spot_axis_ratio in imperfections,
         Limits::FromTo(1.0, 10.0),

@@ -5,6 +5,7 @@ use super::keys::{IMPERFECTION_KEYS, KEYS};
 use super::preset::Preset;
 use super::response::Response;
 use super::sheet::DataSheet;
+use crate::camera::Projection;
 use std::fmt::Write as _;
 
 /// Writes a `camera.toml` with the values of `preset` and a comment on each.
@@ -36,12 +37,15 @@ fn imperfections(sheet: &DataSheet) -> String {
         "\n# Optional properties, which affect simulated frames (vignetting predictions, too):\n"
             .to_owned();
     let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
+    let projections = Projection::ALL.map(|projection| format!("{:?}", projection.name()));
     let imperfections = &sheet.imperfections;
     let _ = writeln!(
         text,
-        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
+        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# the ideal lens that is nearest: {}\n# projection = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
         forms.join(", "),
         imperfections.spot_form.name(),
+        projections.join(", "),
+        imperfections.projection.name(),
         imperfections.mirrored
     );
     for key in IMPERFECTION_KEYS {

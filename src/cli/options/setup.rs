@@ -6,6 +6,7 @@ use super::scenario::{ScenarioOptions, in_file};
 use crate::cli::exit::CommandError;
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
+use starpipe::camera::Projection;
 use starpipe::camera::data_sheet::SpotForm;
 use starpipe::model::sensitivity::{Scenario, ScenarioError};
 use starpipe::model::simulate::{Scene, Setup, SetupParameter};
@@ -58,6 +59,7 @@ impl SetupOptions {
 pub(crate) struct SceneOptions {
     numbers: Vec<(SetupParameter, f64)>,
     spot_form: Option<SpotForm>,
+    projection: Option<Projection>,
     mirrored: bool,
 }
 
@@ -72,11 +74,13 @@ impl SceneOptions {
         }
         let imperfections = &mut setup.scenario.camera.imperfections;
         imperfections.spot_form = self.spot_form.unwrap_or(imperfections.spot_form);
+        imperfections.projection = self.projection.unwrap_or(imperfections.projection);
         imperfections.mirrored |= self.mirrored;
     }
 }
 
 const SPOT_FORM: &str = "spot_form";
+const PROJECTION: &str = "projection";
 const MIRRORED: &str = "mirrored";
 const CAMERA_HEADING: &str = "Imperfections of the camera";
 
@@ -91,13 +95,24 @@ impl clap::Args for SceneOptions {
             .value_parser(move |text: &str| {
                 SpotForm::named(text).ok_or_else(|| format!("expected {forms}"))
             });
+        let projections = Projection::ALL.map(Projection::name).join("|");
+        let projection = Arg::new(PROJECTION)
+            .long(PROJECTION)
+            .value_name(projections.clone())
+            .help("The ideal lens that is nearest to the camera's [default: the camera's]")
+            .help_heading(CAMERA_HEADING)
+            .value_parser(move |text: &str| {
+                Projection::named(text).ok_or_else(|| format!("expected {projections}"))
+            });
         let mirrored = Arg::new(MIRRORED)
             .long("mirrored")
             .help("Reverse the image from left to right")
             .help_heading(CAMERA_HEADING)
             .action(ArgAction::SetTrue);
         let numbers = SetupParameter::beyond_scenario().map(option);
-        command.args([spot_form, mirrored]).args(numbers)
+        command
+            .args([spot_form, projection, mirrored])
+            .args(numbers)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -116,6 +131,7 @@ impl FromArgMatches for SceneOptions {
                 .filter_map(given)
                 .collect(),
             spot_form: matches.get_one::<SpotForm>(SPOT_FORM).copied(),
+            projection: matches.get_one::<Projection>(PROJECTION).copied(),
             mirrored: matches.get_flag(MIRRORED),
         })
     }

@@ -84,6 +84,7 @@ impl Description<'_> {
             ),
             format!("reading = {reading}"),
             format!("spot_form = {}", sheet.imperfections.spot_form.name()),
+            format!("projection = {}", sheet.imperfections.projection.name()),
             format!("mirrored = {}", sheet.imperfections.mirrored),
         ];
         if let Subject::Flat(electrons) = self.generator.subject {

@@ -74,7 +74,7 @@ fn excluded(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
 
 fn contradiction(case: &Unidentified, found: &Identification) -> Excluded {
     let (boresight, _) = found.icrs_to_camera.boresight_and_up();
-    let pixel_rad = 1.0 / found.camera.focal_length_px;
+    let pixel_rad = 1.0 / found.camera.focal_length_px();
     let width_px = case.field.width_px;
     let allowed = case.priors.pixel_scale_range_rad(width_px);
     let excluding = allowed.filter(|[low, high]| !(*low..=*high).contains(&pixel_rad));
@@ -83,7 +83,10 @@ fn contradiction(case: &Unidentified, found: &Identification) -> Excluded {
         .near
         .map(|near| (boresight.angle_to(&near.centre), near.radius_rad));
     Excluded {
-        fov_x_rad: found.camera.fov_x_rad(),
+        fov_x_rad: found
+            .camera
+            .fov_x_rad()
+            .unwrap_or(2.0 * found.camera.radius_rad()),
         boresight,
         stars: found.matches.len(),
         allowed_fov_x_rad: excluding.map(|scale| fields_of_view(scale, width_px)),

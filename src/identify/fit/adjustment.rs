@@ -1,15 +1,13 @@
 //! The least-squares adjustment of attitude, focal length and lens distortion to star positions in
 //! pixels: its equations, and one Gauss-Newton step.
 //!
-//! In the ideal image plane, with (x, y) the tangent-plane coordinates of a star, f the focal
-//! length in pixels and (u, v) the observed offset from the centre, each star gives two equations,
-//! `f·x − u − Σ cₖ Bₖu(u, v) = 0` and the same in y; they are linear in the distortion cₖ and
-//! nearly so in the small turn ω, since `dx = −ωx·x·y + ωy·(1 + x²) − ωz·y`, `dy = −ωx·(1 + y²) +
-//! ωy·x·y + ωz·x`.
+//! A star is predicted at `c + A D(f g(ω d))`: its direction d, turned by ω, is projected (g), scaled
+//! by the focal length f, distorted (D), stretched (A) and shifted by the axis (c). The two equations
+//! are linear in the distortion's terms and nearly so in ω and ln f.
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{
-    CameraModel, Distortion, DistortionModel, LANES, LENS_TERMS, lens_terms, monomials_in_lanes,
+    CameraModel, Distortion, DistortionModel, LENS_TERMS, MAX_TERMS, MONOMIALS, Observed, monomials,
 };
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, SMatrix, SVector, Vector3};
@@ -27,66 +25,73 @@ pub struct MeasuredStar {
 
 /// Parameters without distortion: rotation about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
-/// The linear terms of a polynomial.
-pub(super) const LINEAR_TERMS: usize = 2;
+/// Parameters with all terms of a lens.
+pub(super) const LENS_PARAMETERS: usize = POSE_PARAMETERS + LENS_TERMS;
+/// Parameters with all terms of any distortion.
+pub(super) const MAX_PARAMETERS: usize = POSE_PARAMETERS + MAX_TERMS;
+/// Maximum number of steps.
+const MAX_ITERATIONS: usize = 15;
+/// Smallest share of a step that is tried.
+const MIN_SHARE: f64 = 0.01;
 /// Largest step in radians: beyond it the fit has diverged.
 const MAX_STEP: f64 = 0.5;
+/// What lenses are like: standard deviation of the terms about zero, in units of half the frame's
+/// diagonal. It only matters where the stars say nothing of a term, as of the axis of a narrow field.
+const USUAL_TERMS: [f64; LENS_TERMS] = [0.5, 0.5, 0.5, 3.0, 3.0, 0.05, 0.05, 0.1, 0.02];
+/// The same of the axis where a lens is no pinhole: frames of these are not cut.
+const USUAL_AXIS_OF_FISHEYE: f64 = 0.1;
+/// The term that shifts the axis along x; the next does along y.
+const AXIS: usize = 3;
+/// The same of the monomials.
+const USUAL_MONOMIAL: f64 = 0.02;
 
-/// A least-squares adjustment of `P` parameters that both equations of a star share, and of `K`
-/// monomial coefficients for each axis.
-///
-/// The monomials and their weights are the same along x and y and do not change with the pose. So
-/// the normal matrix has blocks, `[A Bₓ Bᵧ; Bₓᵀ C 0; Bᵧᵀ 0 C]`. C is decomposed once; the rest is
-/// `S = A − Bₓ C⁻¹ Bₓᵀ − Bᵧ C⁻¹ Bᵧᵀ`.
-pub(super) struct Adjustment<'a, const P: usize, const K: usize> {
-    pub stars: &'a [MeasuredStar],
-    /// The camera that the next step starts from.
-    pub camera: CameraModel,
-    pub icrs_to_camera: Rotation<Icrs, Camera>,
-    model: Option<DistortionModel>,
-    radius_px: f64,
-    /// L⁻¹ of C = L Lᵀ.
-    pub inverse_root: SMatrix<f64, K, K>,
-}
-
-/// One number for each of several stars that are processed together.
+/// Number of stars that are processed together.
+pub(super) const LANES: usize = 8;
+/// One number for each of them.
 pub(super) type Lanes = [f64; LANES];
 
-/// The two equations of several stars, divided by their standard errors, without the monomials.
-pub(super) struct EquationRows<const P: usize, const K: usize> {
+/// A least-squares adjustment of `P` parameters.
+pub(super) struct Adjustment<'a, const P: usize> {
+    pub stars: &'a [MeasuredStar],
+    /// The camera that the next step starts from, and its attitude.
+    predictor: Predictor,
+    /// The terms that are fitted.
+    model: Option<DistortionModel>,
+    /// Where the axis is, if it is known.
+    axis_px: Option<[f64; 2]>,
+}
+
+/// The two equations of several stars, divided by their standard errors. The unknowns are a turn, the
+/// change of ln f, and the coefficients of the distortion.
+pub(super) struct EquationRows<const P: usize> {
     /// Along x and y.
-    pub common: [[Lanes; P]; 2],
-    /// The coefficients of the monomials, the same along x and y.
-    pub monomials: [Lanes; K],
+    pub terms: [[Lanes; P]; 2],
     pub rhs: [Lanes; 2],
+    residuals: [Lanes; 2],
 }
 
 /// The normal equations, summed over the stars of each lane.
-struct Sums<const P: usize, const K: usize> {
-    /// A (lower triangle), and its right-hand side.
+struct Sums<const P: usize> {
+    /// Lower triangle.
     block: [[Lanes; P]; P],
     vector: [Lanes; P],
-    /// Bᵀ along x and y, and the same for the monomials.
-    coupling: [[[Lanes; P]; K]; 2],
-    vectors: [[Lanes; K]; 2],
+    misfit: Lanes,
 }
 
-impl<const P: usize, const K: usize> Sums<P, K> {
+impl<const P: usize> Sums<P> {
     #[inline(always)]
-    fn add(&mut self, rows: &EquationRows<P, K>) {
-        for axis in 0..2 {
-            let (common, rhs) = (&rows.common[axis], &rows.rhs[axis]);
+    fn add(&mut self, rows: &EquationRows<P>) {
+        for (axis, (terms, rhs)) in rows.terms.iter().zip(&rows.rhs).enumerate() {
+            add_products(
+                &mut self.misfit,
+                &rows.residuals[axis],
+                &rows.residuals[axis],
+            );
             for i in 0..P {
                 for j in 0..=i {
-                    add_products(&mut self.block[i][j], &common[i], &common[j]);
+                    add_products(&mut self.block[i][j], &terms[i], &terms[j]);
                 }
-                add_products(&mut self.vector[i], &common[i], rhs);
-            }
-            for (k, monomial) in rows.monomials.iter().enumerate() {
-                for (sums, common) in self.coupling[axis][k].iter_mut().zip(common) {
-                    add_products(sums, monomial, common);
-                }
-                add_products(&mut self.vectors[axis][k], monomial, rhs);
+                add_products(&mut self.vector[i], &terms[i], rhs);
             }
         }
     }
@@ -99,210 +104,6 @@ pub(super) fn add_products(sums: &mut Lanes, a: &Lanes, b: &Lanes) {
     }
 }
 
-fn total(lanes: &Lanes) -> f64 {
-    lanes.iter().sum()
-}
-
-/// The normal equations after elimination of the monomials.
-pub(super) struct Reduced<const P: usize, const K: usize> {
-    /// S, decomposed.
-    pub root: Cholesky<f64, Const<P>>,
-    /// Its right-hand side.
-    pub vector: SVector<f64, P>,
-    /// L⁻¹ Bᵀ along x and y, and the same for the right-hand side of the monomials.
-    pub coupling: [SMatrix<f64, K, P>; 2],
-    vectors: [SVector<f64, K>; 2],
-}
-
-impl<'a, const P: usize, const K: usize> Adjustment<'a, P, K> {
-    /// `None` for fewer equations than parameters.
-    pub fn new(
-        stars: &'a [MeasuredStar],
-        camera: &CameraModel,
-        icrs_to_camera: &Rotation<Icrs, Camera>,
-        model: Option<DistortionModel>,
-    ) -> Option<Self> {
-        if 2 * stars.len() < P + 2 * K {
-            return None;
-        }
-        let mut adjustment = Self {
-            stars,
-            camera: *camera,
-            icrs_to_camera: *icrs_to_camera,
-            model,
-            radius_px: camera.radius_px(),
-            inverse_root: SMatrix::identity(),
-        };
-        if K > 0 {
-            let shared = shared_sums(&adjustment);
-            let shared = SMatrix::<f64, K, K>::from_fn(|i, j| total(&shared[i.max(j)][i.min(j)]));
-            let root = shared.cholesky()?;
-            root.l_dirty()
-                .solve_lower_triangular_mut(&mut adjustment.inverse_root);
-        }
-        Some(adjustment)
-    }
-
-    /// Number of parameters.
-    pub fn parameters(&self) -> usize {
-        P + 2 * K
-    }
-
-    /// Offsets from the centre along u and v in units of the radius, and 1 / σ (0 in empty lanes).
-    #[inline(always)]
-    fn offsets_and_weights(&self, stars: &[MeasuredStar]) -> ([Lanes; 2], Lanes) {
-        let (mut offsets, mut weights) = ([[0.0; LANES]; 2], [0.0; LANES]);
-        for (lane, star) in stars.iter().enumerate().take(LANES) {
-            let [u, v] = self.camera.offset_of(&star.pixel);
-            offsets[0][lane] = u / self.radius_px;
-            offsets[1][lane] = v / self.radius_px;
-            weights[lane] = 1.0 / star.sigma_px;
-        }
-        (offsets, weights)
-    }
-
-    #[inline(always)]
-    fn weighted_monomials(&self, [u, v]: [&Lanes; 2], weights: &Lanes) -> [Lanes; K] {
-        let mut monomials = monomials_in_lanes::<K>([u, v]);
-        for monomial in &mut monomials {
-            for lane in 0..LANES {
-                monomial[lane] *= -weights[lane];
-            }
-        }
-        monomials
-    }
-
-    /// Tangent-plane coordinates of a star, `None` behind the camera.
-    #[inline(always)]
-    fn tangent(&self, star: &MeasuredStar) -> Option<[f64; 2]> {
-        let direction = self.icrs_to_camera.apply(&star.icrs);
-        let d = direction.as_vector();
-        (d.z > 0.0).then(|| [d.x / d.z, d.y / d.z])
-    }
-
-    /// The equations of [`LANES`] stars, or fewer. `None` if one is behind the camera.
-    #[inline(always)]
-    pub fn rows(&self, stars: &[MeasuredStar]) -> Option<EquationRows<P, K>> {
-        let f = self.camera.focal_length_px;
-        let ([u, v], weights) = self.offsets_and_weights(stars);
-        let [mut x, mut y] = [[0.0; LANES]; 2];
-        for (lane, star) in stars.iter().enumerate().take(LANES) {
-            [x[lane], y[lane]] = self.tangent(star)?;
-        }
-        let mut common = [[[0.0; LANES]; P]; 2];
-        let mut rhs = [[0.0; LANES]; 2];
-        for lane in 0..LANES {
-            let ([x, y], [u, v], weight) = ([x[lane], y[lane]], [u[lane], v[lane]], weights[lane]);
-            let pose = [[-x * y, 1.0 + x * x, -y, x], [-(1.0 + y * y), x * y, x, y]];
-            // The distortion terms that are not monomials along one axis.
-            let terms = if K == 0 {
-                lens_terms([u, v])
-            } else {
-                let mut linear = [[0.0; LENS_TERMS]; 2];
-                [linear[0][0], linear[0][1]] = [u, v];
-                [linear[1][0], linear[1][1]] = [-v, u];
-                linear
-            };
-            for axis in 0..2 {
-                for parameter in 0..P {
-                    common[axis][parameter][lane] = match parameter.checked_sub(POSE_PARAMETERS) {
-                        None => weight * f * pose[axis][parameter],
-                        Some(term) => -weight * terms[axis][term],
-                    };
-                }
-                let offset = [u, v][axis] * self.radius_px;
-                rhs[axis][lane] = weight * (offset - f * [x, y][axis]);
-            }
-        }
-        Some(EquationRows {
-            common,
-            monomials: self.weighted_monomials([&u, &v], &weights),
-            rhs,
-        })
-    }
-
-    /// The normal equations at the present camera and attitude. `None` if a star is behind the
-    /// camera, or the stars do not determine the parameters.
-    pub fn reduced(&self) -> Option<Reduced<P, K>> {
-        let sums = sums(self)?;
-        let mut block =
-            SMatrix::<f64, P, P>::from_fn(|i, j| total(&sums.block[i.max(j)][i.min(j)]));
-        let mut vector = SVector::<f64, P>::from_fn(|i, _| total(&sums.vector[i]));
-        let mut coupling = [0, 1].map(|axis: usize| {
-            SMatrix::<f64, K, P>::from_fn(|k, j| total(&sums.coupling[axis][k][j]))
-        });
-        let mut vectors = [0, 1]
-            .map(|axis: usize| SVector::<f64, K>::from_fn(|k, _| total(&sums.vectors[axis][k])));
-        for axis in 0..2 {
-            coupling[axis] = self.inverse_root * coupling[axis];
-            vectors[axis] = self.inverse_root * vectors[axis];
-            block -= coupling[axis].tr_mul(&coupling[axis]);
-            vector -= coupling[axis].tr_mul(&vectors[axis]);
-        }
-        let root = block.cholesky()?;
-        Some(Reduced {
-            root,
-            vector,
-            coupling,
-            vectors,
-        })
-    }
-
-    /// One Gauss-Newton step. Returns its size (radians, and relative change of the focal length)
-    /// and its normal equations.
-    pub fn step(&mut self) -> Option<(f64, Reduced<P, K>)> {
-        let reduced = self.reduced()?;
-        let common = reduced.root.solve(&reduced.vector);
-        let turn = Vector3::new(common[0], common[1], common[2]);
-        let size = turn.norm().max(common[3].abs());
-        if size.is_nan() || size > MAX_STEP {
-            return None;
-        }
-        let of_monomials = [0, 1].map(|axis: usize| {
-            let rest = reduced.vectors[axis] - reduced.coupling[axis] * common;
-            self.inverse_root.tr_mul(&rest)
-        });
-        self.icrs_to_camera = self.icrs_to_camera.then_turn(turn);
-        self.camera.focal_length_px *= common[3].exp();
-        self.camera.distortion = self.model.map(|model| {
-            let mut coefficients = [0.0; DistortionModel::Quintic.terms()];
-            coefficients[..P - POSE_PARAMETERS]
-                .copy_from_slice(&common.as_slice()[POSE_PARAMETERS..]);
-            for (k, pair) in coefficients[P - POSE_PARAMETERS..]
-                .as_chunks_mut()
-                .0
-                .iter_mut()
-                .take(K)
-                .enumerate()
-            {
-                *pair = [of_monomials[0][k], of_monomials[1][k]];
-            }
-            Distortion::new(model, self.radius_px, &coefficients[..model.terms()])
-        });
-        Some((size, reduced))
-    }
-
-    /// Position by a pinhole minus position by the star's direction, of [`LANES`] stars or fewer.
-    /// `None` if one is behind the camera.
-    #[inline(always)]
-    pub fn residuals_px(&self, stars: &[MeasuredStar]) -> Option<[Lanes; 2]> {
-        let f = self.camera.focal_length_px;
-        let (mut observed, mut tangents) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
-        for (lane, star) in stars.iter().enumerate().take(LANES) {
-            let (offset, tangent) = (self.camera.offset_of(&star.pixel), self.tangent(star)?);
-            for axis in 0..2 {
-                observed[axis][lane] = offset[axis];
-                tangents[axis][lane] = tangent[axis];
-            }
-        }
-        let mut residuals_px = self.camera.ideal_offsets(&observed);
-        for axis in 0..2 {
-            add_scaled(&mut residuals_px[axis], -f, &tangents[axis]);
-        }
-        Some(residuals_px)
-    }
-}
-
 /// Adds `values` times `factor` to `sums`.
 #[inline(always)]
 pub(super) fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
@@ -311,10 +112,329 @@ pub(super) fn add_scaled(sums: &mut Lanes, factor: f64, values: &Lanes) {
     }
 }
 
-/// Fills `residuals_px` with those of all stars; `None` if one is behind the camera.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(super) fn all_residuals_px<const P: usize, const K: usize>(
-    adjustment: &Adjustment<P, K>,
+/// The normal equations.
+pub(super) struct Normal<const P: usize> {
+    /// The matrix, decomposed.
+    pub root: Cholesky<f64, Const<P>>,
+    /// The right-hand side.
+    pub vector: SVector<f64, P>,
+    /// Sum of the squared residuals, in standard errors; unusual terms add to it.
+    misfit: f64,
+}
+
+/// Predicts where stars are, with the derivatives by all parameters.
+#[derive(Clone, Copy)]
+pub(crate) struct Predictor {
+    camera: CameraModel,
+    /// ICRS to the axes of its lens.
+    icrs_to_lens: Rotation<Icrs, Camera>,
+    /// Its distortion; without one, a model with all terms 0.
+    distortion: Distortion,
+}
+
+/// Where a star is predicted.
+pub(crate) struct Prediction {
+    /// Derivatives by the turn and ln f.
+    pub by_pose: [[f64; POSE_PARAMETERS]; 2],
+    /// The place, and its derivatives by the terms of the lens.
+    pub observed: Observed,
+    /// Its offset from the axis without distortion, in units of R.
+    ideal: [f64; 2],
+}
+
+impl Prediction {
+    /// The monomials of an irregular distortion there.
+    fn monomials(&self) -> [f64; MONOMIALS] {
+        monomials(self.ideal)
+    }
+
+    /// Derivatives of a coordinate by the coefficients of the monomials.
+    pub fn monomials_along(&self, axis: usize) -> impl Iterator<Item = f64> {
+        let pair = move |value: f64| {
+            if axis == 0 {
+                [value, 0.0]
+            } else {
+                [0.0, value]
+            }
+        };
+        self.monomials().into_iter().flat_map(pair)
+    }
+}
+
+impl Predictor {
+    /// The stars as seen by `camera` in this attitude, with the terms of `model` alone.
+    pub fn new(
+        camera: &CameraModel,
+        icrs_to_camera: &Rotation<Icrs, Camera>,
+        model: Option<DistortionModel>,
+    ) -> Self {
+        let mut coefficients_px = [0.0; MAX_TERMS];
+        let terms = model.map_or(0, DistortionModel::terms);
+        if let Some(distortion) = camera.distortion() {
+            let known = distortion.coefficients_px().iter().take(terms);
+            let all = coefficients_px.iter_mut().zip(known);
+            all.for_each(|(new, old)| *new = *old);
+        }
+        let mut predictor = Self {
+            camera: *camera,
+            icrs_to_lens: *icrs_to_camera,
+            distortion: Distortion::new(
+                DistortionModel::Irregular5,
+                camera.radius_px(),
+                &coefficients_px,
+            ),
+        };
+        predictor.set_lens(camera.focal_length_px(), &coefficients_px, model);
+        let to_lens = predictor.camera.lens_axes();
+        predictor.icrs_to_lens = Rotation::from_matrix(to_lens * icrs_to_camera.matrix());
+        predictor
+    }
+
+    /// Sets the lens, and leaves its axes.
+    fn set_lens(
+        &mut self,
+        focal_length_px: f64,
+        coefficients_px: &[f64; MAX_TERMS],
+        model: Option<DistortionModel>,
+    ) {
+        let radius_px = self.distortion.radius_px();
+        let [all, of_model] = [Some(DistortionModel::Irregular5), model].map(|model| {
+            model.map(|m| Distortion::new(m, radius_px, &coefficients_px[..m.terms()]))
+        });
+        self.distortion = all.unwrap_or(self.distortion);
+        let camera = self.camera.with_focal_length(focal_length_px);
+        self.camera = camera.with_distortion(of_model);
+    }
+
+    /// `None` if the star is not imaged.
+    #[inline(always)]
+    pub fn predict(&self, star: &MeasuredStar) -> Option<Prediction> {
+        let f = self.camera.focal_length_px();
+        let direction = self.icrs_to_lens.apply(&star.icrs);
+        let projected = self.camera.projection().project(&direction)?;
+        let ideal = projected.at.map(|along| along * f);
+        let observed = self.distortion.observe(ideal)?;
+        let by_pose = observed.by_ideal.map(|[by_u, by_v]| {
+            let [u, v] = projected.by_turn;
+            let by_turn = |turn: usize| f * (by_u * u[turn] + by_v * v[turn]);
+            let by_ln_f = by_u * ideal[0] + by_v * ideal[1];
+            [by_turn(0), by_turn(1), by_turn(2), by_ln_f]
+        });
+        let radius_px = self.distortion.radius_px();
+        Some(Prediction {
+            by_pose,
+            observed,
+            ideal: ideal.map(|along| along / radius_px),
+        })
+    }
+}
+
+impl<'a, const P: usize> Adjustment<'a, P> {
+    /// An adjustment with the terms of `model`.
+    pub fn new(
+        stars: &'a [MeasuredStar],
+        camera: &CameraModel,
+        icrs_to_camera: &Rotation<Icrs, Camera>,
+        model: Option<DistortionModel>,
+    ) -> Self {
+        Self {
+            stars,
+            predictor: Predictor::new(camera, icrs_to_camera, model),
+            model,
+            axis_px: None,
+        }
+    }
+
+    /// The same with the axis that the camera has.
+    pub fn with_known_axis(mut self) -> Self {
+        self.axis_px = Some(self.predictor.distortion.axis_offset_px());
+        self
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &CameraModel {
+        &self.predictor.camera
+    }
+
+    /// The attitude.
+    pub fn icrs_to_camera(&self) -> Rotation<Icrs, Camera> {
+        let Predictor {
+            camera,
+            icrs_to_lens,
+            ..
+        } = &self.predictor;
+        Rotation::from_matrix(camera.lens_axes().tr_mul(icrs_to_lens.matrix()))
+    }
+
+    /// The equations of [`LANES`] stars, or fewer. `None` if one is not imaged.
+    #[inline(always)]
+    pub fn rows(&self, stars: &[MeasuredStar]) -> Option<EquationRows<P>> {
+        let mut rows = EquationRows {
+            terms: [[[0.0; LANES]; P]; 2],
+            rhs: [[0.0; LANES]; 2],
+            residuals: [[0.0; LANES]; 2],
+        };
+        let Predictor {
+            camera, distortion, ..
+        } = &self.predictor;
+        let known = distortion.coefficients_px();
+        for (lane, star) in stars.iter().enumerate().take(LANES) {
+            let prediction = self.predictor.predict(star)?;
+            let Prediction {
+                by_pose, observed, ..
+            } = &prediction;
+            let offset = camera.offset_of(&star.pixel);
+            let weight = 1.0 / star.sigma_px;
+            for axis in 0..2 {
+                let mut residual = offset[axis] - observed.at[axis];
+                rows.residuals[axis][lane] = weight * residual;
+                let by_parameters = by_pose[axis].iter().chain(&observed.by_term[axis]);
+                for (terms, by) in rows.terms[axis].iter_mut().zip(by_parameters) {
+                    terms[lane] = weight * by;
+                }
+                let of_terms = observed.by_term[axis].iter().zip(known);
+                residual += of_terms.map(|(by, value)| by * value).sum::<f64>();
+                rows.rhs[axis][lane] = weight * residual;
+            }
+            if P > LENS_PARAMETERS {
+                let pairs = known[LENS_TERMS..].as_chunks::<2>().0.iter();
+                let monomials = prediction.monomials();
+                let fitted = (P - LENS_PARAMETERS) / 2;
+                for (k, (monomial, pair)) in monomials.iter().zip(pairs).take(fitted).enumerate() {
+                    for (axis, coefficient) in pair.iter().enumerate() {
+                        let parameter = LENS_PARAMETERS + 2 * k + axis;
+                        rows.terms[axis][parameter][lane] = weight * monomial;
+                        rows.rhs[axis][lane] += weight * monomial * coefficient;
+                    }
+                }
+            }
+        }
+        Some(rows)
+    }
+
+    /// The normal equations at the present camera and attitude. `None` if a star is not imaged, or the
+    /// stars do not determine the parameters.
+    pub fn normal(&self) -> Option<Normal<P>> {
+        let sums = sums(self)?;
+        let total = |lanes: &Lanes| -> f64 { lanes.iter().sum() };
+        let mut block =
+            SMatrix::<f64, P, P>::from_fn(|i, j| total(&sums.block[i.max(j)][i.min(j)]));
+        let mut vector = SVector::<f64, P>::from_fn(|i, _| total(&sums.vector[i]));
+        let mut misfit = total(&sums.misfit);
+        let distortion = &self.predictor.distortion;
+        for (term, known_px) in distortion.coefficients_px()[..P - POSE_PARAMETERS]
+            .iter()
+            .enumerate()
+        {
+            let (expected_px, sigma_px) = self.usual(term);
+            let parameter = POSE_PARAMETERS + term;
+            block[(parameter, parameter)] += sigma_px.powi(-2);
+            vector[parameter] += expected_px * sigma_px.powi(-2);
+            misfit += ((known_px - expected_px) / sigma_px).powi(2);
+        }
+        Some(Normal {
+            root: block.cholesky()?,
+            vector,
+            misfit,
+        })
+    }
+
+    /// Mean and standard deviation of a term of lenses in general, in pixels.
+    fn usual(&self, term: usize) -> (f64, f64) {
+        /// Standard deviation of an axis that is known, in pixels.
+        const KNOWN_PX: f64 = 0.01;
+        let radius_px = self.predictor.distortion.radius_px();
+        let of_axis = term.checked_sub(AXIS).filter(|along| *along < 2);
+        match (of_axis, self.axis_px) {
+            (Some(along), Some(axis_px)) => (axis_px[along], KNOWN_PX),
+            (Some(_), None) if !self.predictor.camera.is_pinhole() => {
+                (0.0, USUAL_AXIS_OF_FISHEYE * radius_px)
+            }
+            _ => {
+                let usual = USUAL_TERMS.get(term).unwrap_or(&USUAL_MONOMIAL);
+                (0.0, usual * radius_px)
+            }
+        }
+    }
+
+    /// Gauss-Newton steps, shortened where a whole one makes the fit worse, until a step moves the
+    /// predicted places by less than `converged`, as root mean square in standard errors. Returns the
+    /// normal equations. `None` where it does not converge, or the stars do not determine the parameters.
+    pub fn converge(&mut self, converged: f64) -> Option<Normal<P>> {
+        let mut normal = self.normal()?;
+        for _ in 0..MAX_ITERATIONS {
+            let (change, moved) = self.change(&normal)?;
+            if moved < converged {
+                self.take(&change, 1.0);
+                return Some(normal);
+            }
+            let before = self.predictor;
+            let mut share = 1.0;
+            normal = loop {
+                self.take(&change, share);
+                match self.normal() {
+                    Some(next) if next.misfit <= normal.misfit => break next,
+                    _ if share > MIN_SHARE => {
+                        self.predictor = before;
+                        share *= 0.5;
+                    }
+                    _ => return None,
+                }
+            };
+        }
+        None
+    }
+
+    /// The change of the parameters that the normal equations ask for, and by how much it moves the
+    /// predicted places.
+    fn change(&self, normal: &Normal<P>) -> Option<(SVector<f64, P>, f64)> {
+        let mut change = normal.root.solve(&normal.vector);
+        let turn = Vector3::new(change[0], change[1], change[2]);
+        let size = turn.norm().max(change[3].abs());
+        if size.is_nan() || size > MAX_STEP {
+            return None;
+        }
+        let known = self.predictor.distortion.coefficients_px();
+        for (change, known) in change.iter_mut().skip(POSE_PARAMETERS).zip(known) {
+            *change -= known;
+        }
+        let moved = normal.root.l().tr_mul(&change).norm_squared();
+        Some((change, (moved / (2.0 * self.stars.len() as f64)).sqrt()))
+    }
+
+    /// Changes the parameters by a share of `change`.
+    fn take(&mut self, change: &SVector<f64, P>, share: f64) {
+        let predictor = &mut self.predictor;
+        let turn = Vector3::new(change[0], change[1], change[2]) * share;
+        predictor.icrs_to_lens = predictor.icrs_to_lens.then_turn(turn);
+        let focal_length_px = predictor.camera.focal_length_px() * (share * change[3]).exp();
+        let mut coefficients_px = [0.0; MAX_TERMS];
+        let known = predictor.distortion.coefficients_px();
+        let changes = change.iter().skip(POSE_PARAMETERS);
+        for ((new, known), change) in coefficients_px.iter_mut().zip(known).zip(changes) {
+            *new = known + share * change;
+        }
+        predictor.set_lens(focal_length_px, &coefficients_px, self.model);
+    }
+
+    /// Observed minus predicted position of [`LANES`] stars or fewer. `None` if one is not imaged.
+    #[inline(always)]
+    pub fn residuals_px(&self, stars: &[MeasuredStar]) -> Option<[Lanes; 2]> {
+        let mut residuals_px = [[0.0; LANES]; 2];
+        for (lane, star) in stars.iter().enumerate().take(LANES) {
+            let predicted = self.predictor.predict(star)?.observed.at;
+            let offset = self.predictor.camera.offset_of(&star.pixel);
+            for axis in 0..2 {
+                residuals_px[axis][lane] = offset[axis] - predicted[axis];
+            }
+        }
+        Some(residuals_px)
+    }
+}
+
+/// Fills `residuals_px` with those of all stars; `None` if one is not imaged.
+pub(super) fn all_residuals_px<const P: usize>(
+    adjustment: &Adjustment<P>,
     residuals_px: &mut Vec<[f64; 2]>,
 ) -> Option<()> {
     residuals_px.clear();
@@ -325,30 +445,13 @@ pub(super) fn all_residuals_px<const P: usize, const K: usize>(
     Some(())
 }
 
-/// C (lower triangle), summed over the stars of each lane.
+/// The sums of the normal equations; `None` if a star is not imaged.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn shared_sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [[Lanes; K]; K] {
-    let mut sums = [[[0.0; LANES]; K]; K];
-    for stars in adjustment.stars.chunks(LANES) {
-        let ([u, v], weights) = adjustment.offsets_and_weights(stars);
-        let monomials = adjustment.weighted_monomials([&u, &v], &weights);
-        for i in 0..K {
-            for j in 0..=i {
-                add_products(&mut sums[i][j], &monomials[i], &monomials[j]);
-            }
-        }
-    }
-    sums
-}
-
-/// The sums of the normal equations; `None` if a star is behind the camera.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> Option<Sums<P, K>> {
+fn sums<const P: usize>(adjustment: &Adjustment<P>) -> Option<Sums<P>> {
     let mut sums = Sums {
         block: [[[0.0; LANES]; P]; P],
         vector: [[0.0; LANES]; P],
-        coupling: [[[[0.0; LANES]; P]; K]; 2],
-        vectors: [[[0.0; LANES]; K]; 2],
+        misfit: [0.0; LANES],
     };
     for stars in adjustment.stars.chunks(LANES) {
         sums.add(&adjustment.rows(stars)?);

@@ -1,14 +1,18 @@
 //! Fits of attitude and camera to stars.
 //!
 //! [`fit_camera`] fits attitude, focal length and lens distortion to star positions in pixels.
+//! `growth` follows a lens from a part of the frame over all of it.
 //! `refine` pairs stars and fits in turn, until a hypothesis has all of its stars.
 
 mod adjustment;
 mod camera_fit;
+mod growth;
 mod predictions;
 mod refine;
 
 pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
+pub(crate) use adjustment::{Prediction, Predictor};
 pub use camera_fit::{CameraFit, fit_camera};
-pub use predictions::{Predictions, predictions_by_lens_terms, predictions_by_polynomial};
+pub(crate) use growth::{Growth, Seed};
+pub use predictions::{Predictions, predictions_by_terms};
 pub(crate) use refine::{NamingStart, Refined, Refiner, Start};

@@ -7,20 +7,19 @@
 //! leverages of each model in turn.
 
 use super::adjustment::{
-    Adjustment, EquationRows, LINEAR_TERMS, Lanes, MeasuredStar, POSE_PARAMETERS, Reduced,
-    add_products, add_scaled,
+    Adjustment, LANES, LENS_PARAMETERS, Lanes, MAX_PARAMETERS, MeasuredStar, Normal,
+    POSE_PARAMETERS, add_products, add_scaled,
 };
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::camera::{
-    CUBIC_MONOMIALS, CameraModel, DistortionModel, LANES, LENS_TERMS, QUINTIC_MONOMIALS,
-};
+use crate::camera::{CameraModel, DistortionModel, MAX_TERMS};
 use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 /// Smallest freedom of an equation at which its left-out residual is defined.
 const MIN_FREEDOM: f64 = 1e-6;
-/// Parameters of a camera with all terms of a lens.
-const LENS_PARAMETERS: usize = POSE_PARAMETERS + LENS_TERMS;
+
+/// Parameters of [`DistortionModel::Irregular3`].
+const CUBIC_PARAMETERS: usize = POSE_PARAMETERS + DistortionModel::Irregular3.terms();
 
 /// How well the fit of a model predicts what is not in it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -32,95 +31,69 @@ pub struct Predictions {
     pub corner_sigma_px: f64,
 }
 
-/// The predictions by lenses with no terms, with the first, with the first two and so on, to all of
-/// [`DistortionModel::BrownConrady`]. `camera` and `icrs_to_camera` must be close to the best ones.
+/// The predictions by distortions with no terms, with the first, with the first two and so on, to all
+/// of `richest`, in a list for all terms that there are. `camera` and `icrs_to_camera` must be close to
+/// the best ones.
 ///
 /// `None` where the stars do not determine the parameters.
-pub fn predictions_by_lens_terms(
+pub fn predictions_by_terms(
     stars: &[MeasuredStar],
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
-) -> Option<[Predictions; LENS_TERMS + 1]> {
-    let model = Some(DistortionModel::BrownConrady);
-    let adjustment = Adjustment::<LENS_PARAMETERS, 0>::new(stars, camera, icrs_to_camera, model)?;
-    let reduced = adjustment.reduced()?;
-    let shares = reduced
-        .root
-        .l_dirty()
-        .solve_lower_triangular(&reduced.vector)?;
-    nested(&adjustment, &reduced, &shares)
-}
-
-/// The same for the richest models, [`DistortionModel::Cubic`] and [`DistortionModel::Quintic`].
-pub fn predictions_by_polynomial(
-    stars: &[MeasuredStar],
-    camera: &CameraModel,
-    icrs_to_camera: &Rotation<Icrs, Camera>,
-    model: DistortionModel,
-) -> Option<Predictions> {
-    const PARAMETERS: usize = POSE_PARAMETERS + LINEAR_TERMS;
-    if model == DistortionModel::Cubic {
-        predictions(Adjustment::<PARAMETERS, CUBIC_MONOMIALS>::new(
-            stars,
-            camera,
-            icrs_to_camera,
-            Some(model),
-        )?)
-    } else {
-        predictions(Adjustment::<PARAMETERS, QUINTIC_MONOMIALS>::new(
-            stars,
-            camera,
-            icrs_to_camera,
-            Some(model),
-        )?)
+    richest: DistortionModel,
+) -> Option<[Predictions; MAX_TERMS + 1]> {
+    use DistortionModel::{Irregular3, Irregular5, Stretched};
+    match richest {
+        Irregular5 => of_terms::<MAX_PARAMETERS>(stars, camera, icrs_to_camera, Irregular5),
+        Irregular3 => of_terms::<CUBIC_PARAMETERS>(stars, camera, icrs_to_camera, Irregular3),
+        _ => of_terms::<LENS_PARAMETERS>(stars, camera, icrs_to_camera, Stretched),
     }
 }
 
-fn predictions<const P: usize, const K: usize>(
-    mut adjustment: Adjustment<P, K>,
-) -> Option<Predictions> {
-    let (_, reduced) = adjustment.step()?;
-    let corners = adjustment.rows(&corners(&adjustment))?;
-    let leverages = leverages(&adjustment, &corners, &reduced);
-    Some(Predictions {
-        left_out_chi_sq: left_out_sum(&adjustment, &reduced)?,
-        corner_sigma_px: corner_sigma_px(&leverages),
-    })
+fn of_terms<const P: usize>(
+    stars: &[MeasuredStar],
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    richest: DistortionModel,
+) -> Option<[Predictions; MAX_TERMS + 1]> {
+    let adjustment = Adjustment::<P>::new(stars, camera, icrs_to_camera, Some(richest));
+    let normal = adjustment.normal()?;
+    let shares = normal
+        .root
+        .l_dirty()
+        .solve_lower_triangular(&normal.vector)?;
+    nested(&adjustment, &normal, &shares)
 }
 
-/// The corners of the frame as stars with an error of 1 px: the leverages of their equations are
+/// The corners of the frame that see the sky, as stars with an error of 1 px: the leverages of their equations are
 /// the squared errors of their predicted positions.
-fn corners<const P: usize, const K: usize>(adjustment: &Adjustment<P, K>) -> [MeasuredStar; 4] {
-    let camera = &adjustment.camera;
-    let camera_to_icrs = adjustment.icrs_to_camera.inverse();
-    camera.corners().map(|pixel| MeasuredStar {
-        pixel,
-        icrs: camera_to_icrs.apply(&camera.direction_of(&pixel)),
-        sigma_px: 1.0,
+fn corners<const P: usize>(adjustment: &Adjustment<P>) -> impl Iterator<Item = MeasuredStar> {
+    let camera = *adjustment.camera();
+    let camera_to_icrs = adjustment.icrs_to_camera().inverse();
+    camera.corners().into_iter().filter_map(move |pixel| {
+        Some(MeasuredStar {
+            pixel,
+            icrs: camera_to_icrs.apply(&camera.direction_of(&pixel)?),
+            sigma_px: 1.0,
+        })
     })
 }
 
-/// The larger of the errors at the [`corners`], from the leverages of their equations along x and y.
-fn corner_sigma_px([along_x, along_y]: &[Lanes; 2]) -> f64 {
-    let squares = along_x.iter().zip(along_y).map(|(x, y)| x + y);
-    squares.fold(0.0, f64::max).sqrt()
-}
-
-/// The numbers of [`predictions_by_lens_terms`]; `shares` is L⁻¹ times the right-hand side.
+/// The numbers of [`predictions_by_terms`]; `shares` is L⁻¹ times the right-hand side.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn nested(
-    adjustment: &Adjustment<LENS_PARAMETERS, 0>,
-    reduced: &Reduced<LENS_PARAMETERS, 0>,
-    shares: &SVector<f64, LENS_PARAMETERS>,
-) -> Option<[Predictions; LENS_TERMS + 1]> {
-    let root = reduced.root.l_dirty();
-    let mut sums = [[0.0; LANES]; LENS_TERMS + 1];
+fn nested<const P: usize>(
+    adjustment: &Adjustment<P>,
+    normal: &Normal<P>,
+    shares: &SVector<f64, P>,
+) -> Option<[Predictions; MAX_TERMS + 1]> {
+    let root = normal.root.l_dirty();
+    let mut sums = [[0.0; LANES]; MAX_TERMS + 1];
     for stars in adjustment.stars.chunks(LANES) {
         let rows = adjustment.rows(stars)?;
         for axis in 0..2 {
-            let (mut terms, mut residual) = (rows.common[axis], rows.rhs[axis]);
+            let (mut terms, mut residual) = (rows.terms[axis], rows.rhs[axis]);
             let mut leverage = [0.0; LANES];
-            for i in 0..LENS_PARAMETERS {
+            for i in 0..P {
                 orthogonalise(&mut terms, i, root);
                 add_products(&mut leverage, &terms[i], &terms[i]);
                 add_scaled(&mut residual, -shares[i], &terms[i]);
@@ -130,21 +103,25 @@ fn nested(
             }
         }
     }
-    let mut of_corners = [[[0.0; LANES]; 2]; LENS_TERMS + 1];
-    let rows = adjustment.rows(&corners(adjustment))?;
-    for (axis, &of_axis) in rows.common.iter().enumerate() {
-        let (mut terms, mut leverage) = (of_axis, [0.0; LANES]);
-        for i in 0..LENS_PARAMETERS {
-            orthogonalise(&mut terms, i, root);
-            add_products(&mut leverage, &terms[i], &terms[i]);
+    let mut largest_px2 = [0.0_f64; MAX_TERMS + 1];
+    for corner in corners(adjustment) {
+        let rows = adjustment.rows(&[corner])?;
+        let mut terms = rows.terms;
+        let mut variance_px2 = 0.0;
+        for i in 0..P {
+            for of_axis in &mut terms {
+                orthogonalise(of_axis, i, root);
+                variance_px2 += of_axis[i][0].powi(2);
+            }
             if i + 1 >= POSE_PARAMETERS {
-                of_corners[i + 1 - POSE_PARAMETERS][axis] = leverage;
+                let largest_px2 = &mut largest_px2[i + 1 - POSE_PARAMETERS];
+                *largest_px2 = largest_px2.max(variance_px2);
             }
         }
     }
     Some(std::array::from_fn(|terms| Predictions {
         left_out_chi_sq: sums[terms].iter().sum(),
-        corner_sigma_px: corner_sigma_px(&of_corners[terms]),
+        corner_sigma_px: largest_px2[terms].sqrt(),
     }))
 }
 
@@ -168,59 +145,12 @@ fn add_left_out(sums: &mut Lanes, residual: &Lanes, leverage: &Lanes) {
     }
 }
 
-/// Σ (residual / σ)² over all equations, each residual as if its equation were left out of the fit.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn left_out_sum<const P: usize, const K: usize>(
-    adjustment: &Adjustment<P, K>,
-    reduced: &Reduced<P, K>,
-) -> Option<f64> {
-    let mut sum = 0.0;
-    for stars in adjustment.stars.chunks(LANES) {
-        let leverages = leverages(adjustment, &adjustment.rows(stars)?, reduced);
-        let residuals_px = adjustment.residuals_px(stars)?;
-        for (lane, star) in stars.iter().enumerate() {
-            for axis in 0..2 {
-                let freedom = (1.0 - leverages[axis][lane]).max(MIN_FREEDOM);
-                sum += (residuals_px[axis][lane] / star.sigma_px / freedom).powi(2);
-            }
-        }
-    }
-    Some(sum)
-}
-
-/// The leverage of each equation of some stars, along x and y.
-#[inline(always)]
-fn leverages<const P: usize, const K: usize>(
-    adjustment: &Adjustment<P, K>,
-    rows: &EquationRows<P, K>,
-    reduced: &Reduced<P, K>,
-) -> [Lanes; 2] {
-    let mut of_monomials = [[0.0; LANES]; K];
-    let mut shared = [0.0; LANES];
-    for (i, of_monomial) in of_monomials.iter_mut().enumerate() {
-        for (j, monomial) in rows.monomials[..=i].iter().enumerate() {
-            add_scaled(of_monomial, adjustment.inverse_root[(i, j)], monomial);
-        }
-        add_products(&mut shared, of_monomial, of_monomial);
-    }
-    let root = reduced.root.l_dirty();
-    [0, 1].map(|axis: usize| {
-        let (mut rest, mut leverage) = (rows.common[axis], shared);
-        for i in 0..P {
-            for (k, of_monomial) in of_monomials.iter().enumerate() {
-                add_scaled(&mut rest[i], -reduced.coupling[axis][(k, i)], of_monomial);
-            }
-            orthogonalise(&mut rest, i, root);
-            add_products(&mut leverage, &rest[i], &rest[i]);
-        }
-        leverage
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
+    use crate::camera::LENS_TERMS;
+    use crate::identify::fit::fit_camera;
 
     /// A camera and its attitude, and stars whose positions scatter by about 0.1 px.
     fn scattered_stars() -> (CameraModel, Rotation<Icrs, Camera>, Vec<MeasuredStar>) {
@@ -232,56 +162,58 @@ mod tests {
             let (dx, dy) = (0.1 * phase.sin(), 0.1 * (phase * 1.7).cos());
             MeasuredStar {
                 pixel: PixelPoint::new(place.x + dx, place.y + dy),
-                icrs: attitude.inverse().apply(&camera.direction_of(&place)),
+                icrs: attitude
+                    .inverse()
+                    .apply(&camera.direction_of(&place).unwrap()),
                 sigma_px: 0.1,
             }
         };
         (camera, attitude, (0..43).map(star).collect())
     }
 
-    #[test]
-    fn nested_models_are_as_each_by_itself() {
+    /// Σ (residual / σ)² with each star's fit made without its equations.
+    fn left_out_sum(model: Option<DistortionModel>) -> f64 {
         let (camera, attitude, stars) = scattered_stars();
-        let nested = predictions_by_lens_terms(&stars, &camera, &attitude).unwrap();
-        let [radial, radial5, radial7, all] = DistortionModel::LENSES.map(Some);
-        let alone = [
-            (
-                0,
-                predictions(Adjustment::<4, 0>::new(&stars, &camera, &attitude, None).unwrap()),
-            ),
-            (
-                1,
-                predictions(Adjustment::<5, 0>::new(&stars, &camera, &attitude, radial).unwrap()),
-            ),
-            (
-                2,
-                predictions(Adjustment::<6, 0>::new(&stars, &camera, &attitude, radial5).unwrap()),
-            ),
-            (
-                3,
-                predictions(Adjustment::<7, 0>::new(&stars, &camera, &attitude, radial7).unwrap()),
-            ),
-            (
-                7,
-                predictions(Adjustment::<11, 0>::new(&stars, &camera, &attitude, all).unwrap()),
-            ),
-        ];
-        for (terms, expected) in alone {
-            let expected = expected.unwrap();
-            let ratio = nested[terms].left_out_chi_sq / expected.left_out_chi_sq;
-            assert!((ratio - 1.0).abs() < 1e-3, "{terms} {ratio}");
-            let ratio = nested[terms].corner_sigma_px / expected.corner_sigma_px;
-            assert!((ratio - 1.0).abs() < 1e-3, "{terms} {ratio}");
+        let mut sum = 0.0;
+        for left_out in 0..stars.len() {
+            let mut others = stars.clone();
+            others.remove(left_out);
+            let mut residuals_px = Vec::new();
+            let fit = fit_camera(&others, &camera, &attitude, model, &mut residuals_px).unwrap();
+            let star = &stars[left_out];
+            let there = fit
+                .camera
+                .pixel_of(&fit.icrs_to_camera.apply(&star.icrs))
+                .unwrap();
+            sum += (there.distance_to(&star.pixel) / star.sigma_px).powi(2);
+        }
+        sum
+    }
+
+    #[test]
+    fn nested_models_predict_stars_as_fits_without_them() {
+        let (camera, attitude, stars) = scattered_stars();
+        let nested =
+            predictions_by_terms(&stars, &camera, &attitude, DistortionModel::Stretched).unwrap();
+        for model in [None]
+            .into_iter()
+            .chain(DistortionModel::ALL.map(Some))
+            .take(6)
+        {
+            let found = nested[model.map_or(0, DistortionModel::terms)].left_out_chi_sq;
+            // Each of the two equations is left out by itself, here both of a star.
+            let ratio = found / left_out_sum(model);
+            assert!((ratio - 1.0).abs() < 0.06, "{model:?} {ratio}");
         }
     }
 
     #[test]
     fn too_much_freedom_shows() {
         let (camera, attitude, stars) = scattered_stars();
-        let lenses = predictions_by_lens_terms(&stars, &camera, &attitude).unwrap();
-        let quintic = DistortionModel::Quintic;
-        let rich = predictions_by_polynomial(&stars, &camera, &attitude, quintic).unwrap();
-        assert!(rich.left_out_chi_sq > lenses[0].left_out_chi_sq);
-        assert!(rich.corner_sigma_px > lenses[0].corner_sigma_px);
+        let nested =
+            predictions_by_terms(&stars, &camera, &attitude, DistortionModel::Stretched).unwrap();
+        let [few, all] = [nested[0], nested[LENS_TERMS]];
+        assert!(all.left_out_chi_sq > few.left_out_chi_sq);
+        assert!(all.corner_sigma_px > few.corner_sigma_px);
     }
 }

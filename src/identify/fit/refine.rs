@@ -4,12 +4,13 @@
 //! support
 
 use super::{
-    CameraFit, MeasuredStar, POSE_PARAMETERS, Predictions, fit_camera, predictions_by_lens_terms,
-    predictions_by_polynomial,
+    CameraFit, MeasuredStar, POSE_PARAMETERS, Predictions, fit_camera, predictions_by_terms,
 };
+use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::statistics::median;
-use crate::camera::DistortionModel;
+use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
 use crate::identify::field::{ObservedStar, Photometry};
+use crate::identify::grid::FrameGrid;
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::naming::{Blends, Candidate, Naming, Stars};
 use crate::identify::pairing::{Pair, Pairing};
@@ -28,8 +29,13 @@ const EQUATIONS_PER_PARAMETER: f64 = 4.0;
 /// of a lens needs. It is small: a term that is missed shifts the focal length by several standard
 /// errors, and one that is not needed makes these larger, but not false.
 const WORTH_A_TERM: f64 = 3.0;
-/// The same that a polynomial needs, whose many terms go astray where there are no stars.
-const WORTH_A_POLYNOMIAL: f64 = 12.0;
+/// The same that the monomials need together: the stars that are left out tell of terms too many.
+const WORTH_MONOMIALS: f64 = 12.0;
+/// The same that a lens other than a pinhole needs.
+const WORTH_A_PROJECTION: f64 = 6.0;
+/// Angle from the boresight to the corners above which projections are compared, in radians. In
+/// narrower fields the term r³ is all by which they differ.
+const WIDE_RAD: f64 = 0.3;
 /// So many times more is needed where the stars do not determine the model as far as the corners:
 /// one in 4000 first terms gains that by chance.
 const WORTH_A_GUESS: f64 = 4.5;
@@ -74,6 +80,7 @@ impl Refined {
             camera: self.fit.camera,
             icrs_to_camera: self.fit.icrs_to_camera,
             parameters: self.fit.parameters,
+            fitted_stars: self.fit.stars,
             zero_point_mag: self.zero_point_mag,
         }
     }
@@ -105,12 +112,56 @@ pub struct NamingStart {
     pub min_distortion: Option<DistortionModel>,
 }
 
-/// A hypothesis, and the distortion model to fit from there.
+/// A kind of lens.
+#[derive(Clone, Copy, PartialEq)]
+struct Lens {
+    projection: Projection,
+    model: Option<DistortionModel>,
+}
+
+impl Lens {
+    fn of(camera: &CameraModel) -> Self {
+        Self {
+            projection: camera.projection(),
+            model: camera.distortion_model(),
+        }
+    }
+}
+
+/// A hypothesis, and the lens to fit from there.
 #[derive(Clone, Copy)]
 struct Guess<'a> {
     hypothesis: &'a Hypothesis,
-    model: Option<DistortionModel>,
+    lens: Lens,
     excess_sigma_px: f64,
+}
+
+impl Guess<'_> {
+    /// Camera and attitude to start from.
+    fn start(&self) -> (CameraModel, Rotation<Icrs, Camera>) {
+        with_projection(self.hypothesis, self.lens.projection)
+    }
+}
+
+/// A camera with another projection, which sees the same near the axis of its lens, and its attitude.
+fn with_projection(
+    hypothesis: &Hypothesis,
+    projection: Projection,
+) -> (CameraModel, Rotation<Icrs, Camera>) {
+    let Hypothesis {
+        camera,
+        icrs_to_camera,
+        ..
+    } = hypothesis;
+    if camera.projection() == projection {
+        return (*camera, *icrs_to_camera);
+    }
+    let other = camera.reprojected(projection);
+    let of_axes = other.lens_axes().transpose() * camera.lens_axes();
+    (
+        other,
+        Rotation::from_matrix(of_axes * icrs_to_camera.matrix()),
+    )
 }
 
 /// Refines hypotheses. Its buffers are reused.
@@ -158,16 +209,16 @@ impl Refiner {
         if start.sceptical && !self.is_remarkable(problem, observed.len(), radius_px) {
             return None;
         }
-        let mut model = hypothesis.camera.distortion_model();
+        let mut lens = Lens::of(&hypothesis.camera);
         let mut current = self.fitted(
             problem,
             &Guess {
                 hypothesis,
-                model,
+                lens,
                 excess_sigma_px: 0.0,
             },
         )?;
-        let mut model_chosen = false;
+        let mut is_lens_chosen = false;
         for _ in 0..MAX_ROUNDS {
             radius_px = self.next_radius_px(radius_px);
             let hypothesis = current.hypothesis();
@@ -175,22 +226,22 @@ impl Refiner {
             std::mem::swap(&mut self.pairs, &mut self.before);
             self.pair_up(problem, &hypothesis, observed, radius_px);
             let settled = self.are_pairs_the_same();
-            if settled && model_chosen {
+            if settled && is_lens_chosen {
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 break;
             }
             if settled {
                 // The pairs are the same, with the residuals of the fit.
                 std::mem::swap(&mut self.pairs, &mut self.before);
-                model = self.choose_model(problem, &current, start.richest);
+                lens = self.choose_lens(problem, &current, start.richest);
                 std::mem::swap(&mut self.pairs, &mut self.before);
-                model_chosen = true;
+                is_lens_chosen = true;
             }
             current = self.fitted(
                 problem,
                 &Guess {
                     hypothesis: &hypothesis,
-                    model,
+                    lens,
                     excess_sigma_px: current.excess_sigma_px,
                 },
             )?;
@@ -216,10 +267,8 @@ impl Refiner {
         self.naming
             .start(stars, hypothesis.zero_point_mag, wanted.by_place);
         self.blends.start(self.predicted.len());
-        let mut model = hypothesis
-            .camera
-            .distortion_model()
-            .max(wanted.min_distortion);
+        let mut lens = Lens::of(&hypothesis.camera);
+        lens.model = lens.model.max(wanted.min_distortion);
         let mut current = *settled;
         for round in 0..MAX_NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
@@ -231,22 +280,22 @@ impl Refiner {
             let settled = self.are_pairs_the_same();
             let mut guess = Guess {
                 hypothesis: &hypothesis,
-                model,
+                lens,
                 excess_sigma_px: current.excess_sigma_px,
             };
             current = self.fitted(problem, &guess)?;
-            let model_before = model;
+            let lens_before = lens;
             // The names are more stars than those that the model was chosen for.
             if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
-                let chosen = self.choose_model(problem, &current, DistortionModel::Quintic);
-                let chosen = chosen.max(wanted.min_distortion);
-                if chosen != model {
-                    model = chosen;
-                    guess.model = chosen;
+                let mut chosen = self.choose_lens(problem, &current, DistortionModel::Irregular5);
+                chosen.model = chosen.model.max(wanted.min_distortion);
+                if chosen != lens {
+                    lens = chosen;
+                    guess.lens = chosen;
                     current = self.fitted(problem, &guess)?;
                 }
             }
-            let is_last = round + 1 >= NAMING_ROUNDS && model == model_before;
+            let is_last = round + 1 >= NAMING_ROUNDS && lens == lens_before;
             if settled || is_last {
                 break;
             }
@@ -325,17 +374,14 @@ impl Refiner {
     /// The fit to the pairs, from `guess`.
     fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
         self.measure(problem, guess.excess_sigma_px);
-        let Hypothesis {
-            camera,
-            icrs_to_camera,
-            ..
-        } = guess.hypothesis;
-        let affordable = guess.model.filter(|m| is_affordable(*m, self.stars.len()));
+        let model = guess.lens.model;
+        let affordable = model.filter(|m| is_affordable(*m, self.stars.len()));
+        let (camera, icrs_to_camera) = guess.start();
         let residuals_px = &mut self.residuals_px;
         let fit = fit_camera(
             &self.stars,
-            camera,
-            icrs_to_camera,
+            &camera,
+            &icrs_to_camera,
             affordable,
             residuals_px,
         )?;
@@ -381,34 +427,143 @@ impl Refiner {
         self.stars.extend(self.pairs.iter().map(measured));
     }
 
-    /// The simplest distortion model that no richer one clearly surpasses in predicting left-out
-    /// stars.
-    fn choose_model(
+    /// The lens that predicts left-out stars best, for its number of terms. Only a wide field tells
+    /// projections apart.
+    fn choose_lens(
         &mut self,
         problem: Problem,
         current: &Refined,
         richest: DistortionModel,
-    ) -> Option<DistortionModel> {
+    ) -> Lens {
         self.measure(problem, current.excess_sigma_px);
-        let CameraFit {
+        let is_regular = !self.depend_on_place(problem);
+        let least = DistortionModel::Stretched;
+        let affordable = |model: &DistortionModel| is_affordable(*model, self.stars.len());
+        let of_all = DistortionModel::ALL.into_iter().filter(affordable);
+        let richest = of_all.fold(least, DistortionModel::max).min(richest);
+        let richest = if is_regular {
+            richest.min(least)
+        } else {
+            richest
+        };
+        let hypothesis = current.hypothesis();
+        let is_wide = hypothesis.camera.radius_rad() > WIDE_RAD;
+        if is_wide && richest > DistortionModel::Radial {
+            return self.choose_projection(&hypothesis, richest);
+        }
+        let projection = Projection::Pinhole;
+        let (camera, icrs_to_camera) = with_projection(&hypothesis, projection);
+        let hypothesis = Hypothesis {
+            camera,
+            icrs_to_camera,
+            ..hypothesis
+        };
+        let linear = self.choose_model(&hypothesis, richest);
+        let model = hypothesis.camera.distortion_model();
+        let (model, misfit) = linear.unwrap_or((model, f64::INFINITY));
+        if is_regular || richest <= DistortionModel::Radial || model >= Some(least) {
+            return Lens { projection, model };
+        }
+        // A lens that is far from the present one shows what it is worth only once it is fitted.
+        let fitted = self.fitted_lens(&hypothesis, projection);
+        let richer = fitted.and_then(|fitted| self.choose_model(&fitted, richest));
+        let better = richer.filter(|(richer, less)| *richer > model && *less < misfit);
+        Lens {
+            projection,
+            model: better.map_or(model, |(model, _)| model),
+        }
+    }
+
+    /// The lens whose projection, with the distortion that it needs, predicts left-out stars best. One
+    /// that needs more distortion than a pinhole is no better than a pinhole.
+    fn choose_projection(&mut self, hypothesis: &Hypothesis, richest: DistortionModel) -> Lens {
+        let mut best: Option<(f64, Lens)> = None;
+        let mut pinhole_px = f64::INFINITY;
+        for projection in Projection::ALL {
+            let Some(fitted) = self.fitted_lens(hypothesis, projection) else {
+                continue;
+            };
+            let Some((model, misfit)) = self.choose_model(&fitted, richest) else {
+                continue;
+            };
+            let distortion = fitted.camera.distortion().filter(|_| model.is_some());
+            let largest_px = distortion.map_or(0.0, Distortion::largest_px);
+            let is_pinhole = projection == Projection::Pinhole;
+            if is_pinhole {
+                pinhole_px = largest_px;
+            } else if largest_px > pinhole_px {
+                continue;
+            }
+            let penalty = if is_pinhole { 0.0 } else { WORTH_A_PROJECTION };
+            if best.is_none_or(|(least, _)| misfit + penalty < least) {
+                best = Some((misfit + penalty, Lens { projection, model }));
+            }
+        }
+        best.map_or(Lens::of(&hypothesis.camera), |(_, lens)| lens)
+    }
+
+    /// The best lens of a projection, with all the terms of lenses that the stars can afford.
+    fn fitted_lens(
+        &mut self,
+        hypothesis: &Hypothesis,
+        projection: Projection,
+    ) -> Option<Hypothesis> {
+        let affordable = |model: &DistortionModel| is_affordable(*model, self.stars.len());
+        let model = DistortionModel::LENSES.into_iter().filter(affordable).max();
+        let (camera, icrs_to_camera) = with_projection(hypothesis, projection);
+        let residuals_px = &mut self.residuals_px;
+        let fit = fit_camera(&self.stars, &camera, &icrs_to_camera, model, residuals_px)?;
+        Some(Hypothesis {
+            camera: fit.camera,
+            icrs_to_camera: fit.icrs_to_camera,
+            ..*hypothesis
+        })
+    }
+
+    /// Whether the residuals of the last fit are alike in places next to each other: a lens model is
+    /// too simple then.
+    fn depend_on_place(&self, problem: Problem) -> bool {
+        const CELLS_ALONG: usize = 6;
+        const CELLS: usize = (CELLS_ALONG + 2) * (CELLS_ALONG + 2);
+        /// Standard deviations of the sum of squares that chance does not reach.
+        const SIGMAS: f64 = 4.0;
+        let grid = FrameGrid::new(problem.field, CELLS_ALONG);
+        let mut sums = [[0.0; 3]; CELLS];
+        let mut squares = 0.0;
+        for (star, [x, y]) in self.stars.iter().zip(&self.residuals_px) {
+            let [x, y] = [x / star.sigma_px, y / star.sigma_px];
+            if let Some(sums) = sums.get_mut(grid.cell_of(star.pixel.x, star.pixel.y)) {
+                *sums = [sums[0] + x, sums[1] + y, sums[2] + 1.0];
+            }
+            squares += x * x + y * y;
+        }
+        let variance = squares / (2.0 * self.stars.len() as f64);
+        let filled = sums.iter().filter(|[_, _, stars]| *stars > 0.0);
+        let (mut of_cells, mut freedoms) = (0.0, 0.0);
+        for [x, y, stars] in filled {
+            of_cells += (x * x + y * y) / (stars * variance);
+            freedoms += 2.0;
+        }
+        of_cells > freedoms + SIGMAS * (2.0_f64 * freedoms).sqrt()
+    }
+
+    /// The simplest distortion model that no richer one clearly surpasses in predicting left-out stars;
+    /// and by how much it misses them, with a penalty for its terms.
+    fn choose_model(
+        &mut self,
+        hypothesis: &Hypothesis,
+        richest: DistortionModel,
+    ) -> Option<(Option<DistortionModel>, f64)> {
+        let Hypothesis {
             camera,
             icrs_to_camera,
             ..
-        } = &current.fit;
+        } = hypothesis;
+        let predictions = predictions_by_terms(&self.stars, camera, icrs_to_camera, richest)?;
         let equations = 2.0 * self.stars.len() as f64;
         let heavier_tails = equations / (equations - TAIL_EQUATIONS).max(1.0);
-        let is_unexplained = self.are_residuals_unexplained(problem, current);
-        let stars = &self.stars;
-        let of_lenses = predictions_by_lens_terms(stars, camera, icrs_to_camera)?;
-        let predictions = |model: DistortionModel| {
-            if model.is_lens() {
-                Some(of_lenses[model.terms()])
-            } else {
-                predictions_by_polynomial(stars, camera, icrs_to_camera, model)
-            }
-        };
         let known_corner_px = KNOWN_CORNER * camera.width_px;
-        let mut best = (None, of_lenses[0].left_out_chi_sq);
+        let mut best = (None, predictions[0].left_out_chi_sq);
         let mut is_best_a_guess = false;
         for model in DistortionModel::ALL {
             if model > richest || !is_affordable(model, self.stars.len()) {
@@ -416,23 +571,27 @@ impl Refiner {
             }
             let is_guess = |found: &Predictions| found.corner_sigma_px > known_corner_px;
             let is_better = |found: &Predictions| {
-                let of_guess = if is_guess(found) { WORTH_A_GUESS } else { 1.0 };
+                let of_guess = match (is_guess(found), is_best_a_guess) {
+                    (false, _) => 1.0,
+                    (true, false) => WORTH_A_GUESS,
+                    // The simplest guess brings more stars, and these tell whether it is enough.
+                    (true, true) => WORTH_A_GUESS.powi(2),
+                };
                 let worth = heavier_tails * of_guess * least_gain(model, best.0);
                 equations * (best.1 / found.left_out_chi_sq).ln() > worth
             };
-            match predictions(model) {
-                // The simplest guess brings more stars, and these tell whether it is enough.
-                Some(found) if is_best_a_guess && is_guess(&found) => {}
-                Some(found) if is_better(&found) => {
-                    is_best_a_guess = is_guess(&found);
-                    best = (Some(model), found.left_out_chi_sq);
-                }
-                // Slow: not tried where the cubic is no better and little is left to explain.
-                _ if model == DistortionModel::Cubic && !is_unexplained => break,
-                _ => {}
+            let found = &predictions[model.terms()];
+            if is_better(found) {
+                is_best_a_guess = is_guess(found);
+                best = (Some(model), found.left_out_chi_sq);
             }
         }
-        best.0
+        let (model, left_out_chi_sq) = best;
+        let penalty = model.map_or(0.0, |model| least_gain(model, None));
+        Some((
+            model,
+            equations * left_out_chi_sq.ln() + heavier_tails * penalty,
+        ))
     }
 
     /// The radius that contains practically all true pairs, from the median residual of the last
@@ -492,12 +651,11 @@ impl Refiner {
 
 /// The gain in likelihood over a simpler model that a model needs.
 fn least_gain(model: DistortionModel, simpler: Option<DistortionModel>) -> f64 {
-    if model.is_lens() {
-        let terms = simpler.map_or(0, DistortionModel::terms);
-        WORTH_A_TERM * (model.terms() - terms) as f64
-    } else {
-        WORTH_A_POLYNOMIAL
+    if model >= DistortionModel::Irregular3 {
+        return WORTH_MONOMIALS + least_gain(DistortionModel::Stretched, simpler).max(0.0);
     }
+    let terms = simpler.map_or(0, DistortionModel::terms);
+    WORTH_A_TERM * (model.terms() as f64 - terms as f64)
 }
 
 fn is_affordable(model: DistortionModel, stars: usize) -> bool {

@@ -142,7 +142,7 @@ impl Blends {
             problem,
             hypothesis,
             variance_px2,
-            chord: chord_of(reach_px / hypothesis.camera.focal_length_px),
+            chord: chord_of(reach_px / hypothesis.camera.focal_length_px()),
         };
         self.taken.clear();
         self.taken.extend(taken);
@@ -184,7 +184,9 @@ impl Blends {
                 } else {
                     candidate.distance_px = distance_px;
                     candidate.light = blend.pixel;
-                    candidate.direction = view.direction_of(&blend.pixel);
+                    candidate.direction = view
+                        .direction_of(&blend.pixel)
+                        .unwrap_or(candidate.direction);
                     candidate.v_mag = blend.v_mag;
                 }
             }
@@ -272,9 +274,9 @@ impl BlendView<'_> {
         Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))
     }
 
-    fn direction_of(&self, pixel: &PixelPoint) -> UnitVector<Icrs> {
+    fn direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
         let to_icrs = self.hypothesis.icrs_to_camera.inverse();
-        to_icrs.apply(&self.hypothesis.camera.direction_of(pixel))
+        Some(to_icrs.apply(&self.hypothesis.camera.direction_of(pixel)?))
     }
 }
 

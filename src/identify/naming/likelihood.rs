@@ -1,9 +1,9 @@
 //! How far apart the observed and the predicted star of a true pair lie, in position and magnitude.
 
 use super::candidate::Candidate;
+use super::packed::LANES;
 use super::packed::{Lanes, Packed};
 use crate::base::exponential::exp_of_negative;
-use crate::camera::LANES;
 use crate::identify::field::Photometry;
 use multiversion::multiversion;
 use std::f64::consts::PI;

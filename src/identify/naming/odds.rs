@@ -3,8 +3,8 @@
 use super::candidate::Candidate;
 use super::completeness::odds_of;
 use super::likelihood::{MagnitudeRelation, position_densities};
+use super::packed::LANES;
 use super::packed::{Lanes, Packed};
-use crate::camera::LANES;
 use crate::identify::field::StarField;
 use multiversion::multiversion;
 

@@ -1,6 +1,7 @@
 //! Candidates packed so that several are computed at once.
 
-use crate::camera::LANES;
+/// Number of candidates that are computed together.
+pub const LANES: usize = 8;
 
 /// One number for each of several candidates.
 pub type Lanes = [f64; LANES];

@@ -9,7 +9,7 @@
 //! the number found, times the number of hypotheses, radii and magnitude differences tried, bounds
 //! the expected number of equally good answers by chance (an a-contrario test: Desolneux, Moisan &
 //! Morel 2000, IJCV 40, 7). The three stars of the triangle agree by construction and do not count.
-//! Every two parameters fitted beyond pointing, roll and scale use up another star. The stars used
+//! Every two parameters fitted beyond pointing, roll and scale use up another of the stars fitted. The stars used
 //! up are assumed to be those least likely to agree by chance, which is the pessimistic choice.
 
 use super::plan::MAX_HYPOTHESES;
@@ -88,6 +88,14 @@ struct Test {
     used_up: usize,
 }
 
+/// Number of the `tested` stars that the parameters beyond pointing, roll and scale use up: half of
+/// these parameters where no other stars were fitted, and a share of that where others were.
+fn used_up_by_fit(hypothesis: &Hypothesis, tested: usize) -> usize {
+    let stars = (hypothesis.parameters - POSE_PARAMETERS) as f64 / 2.0;
+    let share = tested as f64 / hypothesis.fitted_stars.max(1) as f64;
+    (stars * share.min(1.0)).ceil() as usize
+}
+
 /// The parameters of a test.
 struct Tested<'a> {
     field: &'a StarField,
@@ -121,7 +129,7 @@ impl FalseAlarm {
         self.chances.clear();
         let largest_mag = field.photometry.tolerance_mag();
         self.find_pairs(hypothesis, observed, largest_mag);
-        let used_up = TRIANGLE_STARS + (hypothesis.parameters - POSE_PARAMETERS).div_ceil(2);
+        let used_up = TRIANGLE_STARS + used_up_by_fit(hypothesis, observed.len());
         let mut tests = 0;
         for (index, count) in BRIGHTEST.into_iter().enumerate() {
             if index > 0 && count >= observed.len() {

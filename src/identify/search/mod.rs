@@ -2,7 +2,8 @@
 //!
 //! `triangle_search` looks triangles up (`queries`) and confirms what they suggest (`confirmation`), as
 //! far as a `plan` goes, and counts `votes` for poses (`aligned`, `pose_cells`); `false_alarm` decides.
-//! `thinning` and `tiers` leave detections out that hide the stars.
+//! `thinning` and `tiers` leave detections out that hide the stars. In `windows` any lens
+//! is like a pinhole.
 
 mod aligned;
 mod confirmation;
@@ -15,8 +16,10 @@ mod tiers;
 mod triangle_search;
 mod unseen;
 mod votes;
+mod windows;
 
 pub use plan::SearchPlan;
 pub use thinning::Thinning;
 pub use tiers::Tiers;
 pub use triangle_search::{Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers};
+pub use windows::{Window, Windows};

@@ -15,6 +15,8 @@ pub const WORK_OF_VOTE: u64 = 3;
 /// Work of a search of the brightest stars, and of another choice of stars.
 const WORK: u64 = 850_000;
 const WORK_OF_OTHERS: u64 = 400_000;
+/// The same in each window.
+const WORK_OF_WINDOW: u64 = 400_000;
 
 /// Some of the triangles of the brightest stars.
 pub struct SearchPass {
@@ -83,6 +85,14 @@ impl SearchPlan {
         Self {
             passes: &PASSES,
             ..Self::other_stars(effort)
+        }
+    }
+
+    /// A window of the frame.
+    pub const fn window(effort: Effort) -> Self {
+        Self {
+            max_work: effort.work(WORK_OF_WINDOW),
+            ..Self::coarse(effort)
         }
     }
 

@@ -12,12 +12,13 @@ use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
 use super::unseen::Unseen;
 use super::votes::{Vote, Votes};
+use super::windows::Window;
 use crate::base::coords::Rotation;
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
 use crate::identify::effort::Effort;
 use crate::identify::field::StarField;
-use crate::identify::fit::{POSE_PARAMETERS, Refined, Refiner, Start};
+use crate::identify::fit::{Growth, MeasuredStar, POSE_PARAMETERS, Refined, Refiner, Seed, Start};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
 use crate::identify::priors::{Priors, SkyRegion};
@@ -56,6 +57,9 @@ pub struct SearchBuffers {
     in_camera: Vec<CameraAxes>,
     /// To confirm answers.
     tiers: Tiers,
+    growth: Growth,
+    /// The stars of a window.
+    seed: Vec<MeasuredStar>,
     /// Ends searches early.
     pub interrupt: Interrupt,
 }
@@ -66,6 +70,8 @@ pub struct Search<'a> {
     plan: SearchPlan,
     effort: Effort,
     near: Option<SkyRegion>,
+    /// Whether the priors have a scale.
+    is_scale_known: bool,
     buffers: &'a mut SearchBuffers,
     observed: ObservedStars<'a>,
     /// Position of this search among those over the field, from 1.
@@ -117,6 +123,7 @@ impl<'a> Search<'a> {
             plan,
             effort,
             near: priors.near,
+            is_scale_known: priors.scale.is_some(),
             buffers,
             observed: ObservedStars {
                 field,
@@ -139,6 +146,74 @@ impl<'a> Search<'a> {
             number: self.number + 1,
             ..Self::new(problem, plan, priors, self.effort, self.buffers)
         }
+    }
+
+    /// Follows the lens of what was found in a window over the `whole` frame, which the search is of from
+    /// then on. `None` where the stars of the frame do not confirm it.
+    pub fn follow(
+        mut self,
+        window: &Window,
+        found: &Found,
+        whole: Problem<'a>,
+        priors: &Priors,
+    ) -> (Self, Option<Found>) {
+        let grown = self.grown(window, found, whole);
+        let (plan, hypotheses) = (self.plan, self.hypotheses);
+        let mut search = self.again(whole, plan, priors);
+        search.hypotheses = hypotheses;
+        let found = grown.and_then(|hypothesis| search.adopt(&hypothesis));
+        (search, found)
+    }
+
+    /// The lens of what was found in a window, as far as the stars of the `whole` frame show it.
+    fn grown(&mut self, window: &Window, found: &Found, whole: Problem) -> Option<Hypothesis> {
+        let refined = self.refined(&found.first, found.radius_px, TESTED_STARS)?;
+        let SearchBuffers {
+            refiner,
+            growth,
+            seed,
+            ..
+        } = &mut *self.buffers;
+        seed.clear();
+        seed.extend(refiner.pairs.iter().map(|pair| {
+            let star = &window.field.stars[pair.observed];
+            MeasuredStar {
+                pixel: window.in_frame(&star.position),
+                icrs: pair.direction,
+                sigma_px: star.sigma_px.hypot(refined.excess_sigma_px).max(1e-3),
+            }
+        }));
+        let seed = Seed {
+            stars: seed,
+            centre: window.centre(),
+            hypothesis: &refined.hypothesis(),
+        };
+        growth.grow(whole, &seed)
+    }
+
+    /// A hypothesis that was not found by a triangle, fitted to the stars of the field; `None` where
+    /// these do not confirm it.
+    fn adopt(&mut self, hypothesis: &Hypothesis) -> Option<Found> {
+        /// Largest distance of true pairs, in diagonals of the frame.
+        const RADIUS_SHARE: f64 = 0.002;
+        let radius_px = RADIUS_SHARE * self.observed.diagonal_px;
+        let start = Start {
+            hypothesis,
+            radius_px,
+            sceptical: false,
+            stars: TESTED_STARS,
+            richest: DistortionModel::BrownConrady,
+        };
+        let refined = self.buffers.refiner.refine(self.problem, &start)?;
+        let log10 = self.log10_with(&refined.hypothesis(), TESTED_STARS)?;
+        self.best_log10 = Some(log10);
+        (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+            log10_false_alarm: log10,
+            refined,
+            stars: TESTED_STARS,
+            first: *hypothesis,
+            radius_px,
+        })
     }
 
     /// The refiner of hypotheses, with the stars that agreed with the last one.
@@ -367,6 +442,7 @@ impl<'a> Search<'a> {
             camera: CameraModel::pinhole(width_px, height_px, focal_px, mirrored),
             icrs_to_camera: Rotation::from_matrix(sky_to_camera),
             parameters: POSE_PARAMETERS,
+            fitted_stars: 0,
             zero_point_mag: pending.zero_point_mag,
         };
         self.decide(&hypothesis, triangle)
@@ -498,11 +574,12 @@ impl<'a> Search<'a> {
 
     /// The same, by the stars of `problem`.
     fn log10_in(&mut self, problem: Problem, hypothesis: &Hypothesis, stars: usize) -> Option<f64> {
-        let focal_px = hypothesis.camera.focal_length_px;
+        let focal_px = hypothesis.camera.focal_length_px();
         let slack = 1.0 + 2.0 * PASSES[1].tolerance;
-        if focal_px < self.observed.focal_px[0] / slack
-            || focal_px > self.observed.focal_px[1] * slack
-        {
+        let [shortest_px, longest_px] = self.observed.focal_px;
+        // The catalogue sets no limit to what else than a pinhole sees.
+        let is_free = !hypothesis.camera.is_pinhole() && !self.is_scale_known;
+        if !is_free && (focal_px < shortest_px / slack || focal_px > longest_px * slack) {
             return None;
         }
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {

@@ -105,6 +105,7 @@ mod tests {
             camera: CameraModel::pinhole(1000.0, 1000.0, 1000.0, false),
             icrs_to_camera: Rotation::looking_at(&UnitVector::from_ra_dec(3.0, 0.3), 0.3),
             parameters: POSE_PARAMETERS,
+            fitted_stars: 0,
             zero_point_mag: 20.0,
         };
         let (mut around, mut predicted) = (Surroundings::default(), Vec::new());

@@ -1,8 +1,9 @@
 //! The camera model of a data sheet, and where the camera points.
 
 use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
-use crate::camera::{CameraModel, Distortion, DistortionModel};
+use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
 
 /// Attitude and date of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,15 +25,17 @@ pub fn camera_of(sheet: &DataSheet) -> CameraModel {
     let focal_length_px = sheet.focal_length_mm * 1e3 / pitch_um;
     let (width_px, height_px) = (sheet.width_px as f64, sheet.height_px as f64);
     let mut camera = CameraModel::pinhole(width_px, height_px, focal_length_px, made.mirrored);
-    // The model maps observed to pinhole positions, which is the opposite direction.
-    let terms_px = made.lens_terms_px().map(|outward| -outward);
-    if let Some(last) = terms_px.iter().rposition(|term| *term != 0.0) {
-        let has_all = |model: &DistortionModel| model.terms() > last;
-        let simplest = DistortionModel::LENSES.into_iter().find(has_all);
-        camera.distortion = simplest.map(|model| {
-            let of_model = &terms_px[..model.terms()];
-            Distortion::new(model, camera.radius_px(), of_model)
-        });
+    if made.projection != Projection::Pinhole {
+        let field_rad = made.field_radius_deg * RAD_PER_DEG;
+        camera = camera
+            .with_projection(made.projection)
+            .limited_to(field_rad);
     }
-    camera
+    let terms_px = made.lens_terms_px();
+    let terms = terms_px.iter().rposition(|term| *term != 0.0);
+    let model = terms.and_then(|last| DistortionModel::with_terms(last + 1));
+    let distortion = |model: DistortionModel| {
+        Distortion::new(model, camera.radius_px(), &terms_px[..model.terms()])
+    };
+    camera.with_distortion(model.map(distortion))
 }

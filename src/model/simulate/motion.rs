@@ -96,7 +96,7 @@ impl<'a> Motion<'a> {
     fn at(&self, middle: &PixelPoint, time: f64) -> Option<PixelPoint> {
         let mut place = *middle;
         if self.angle_rad != 0.0 {
-            let direction = self.turned(self.camera.direction_of(middle).as_vector(), time);
+            let direction = self.turned(self.camera.direction_of(middle)?.as_vector(), time);
             place = self.camera.pixel_of(&UnitVector::from_unit(direction))?;
         }
         place.x += time * self.along_x_px;

@@ -116,7 +116,7 @@ impl<'a> Simulator<'a> {
         let mut uniform = self.scenario.clone();
         let conditions = &mut uniform.conditions;
         let turn_rad = self.scene.typical_rate_rad_s() * conditions.exposure_s;
-        let motion_px = turn_rad * self.camera.focal_length_px;
+        let motion_px = turn_rad * self.camera.focal_length_px();
         conditions.motion_px = conditions.motion_px.hypot(motion_px);
         let none = Scene {
             sky_gradient: 0.0,

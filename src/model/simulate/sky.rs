@@ -61,7 +61,8 @@ impl<'a> Sky<'a> {
 
     /// Fills `image` with the sky, where `sky_e` is that of the uniform sky, in electrons.
     pub(super) fn expose(&self, image: &mut ElectronImage, sky_e: f64) {
-        let is_even = self.vignetting == 0.0 && self.slope == [0.0; 2];
+        let is_pinhole = self.camera.is_pinhole();
+        let is_even = is_pinhole && self.vignetting == 0.0 && self.slope == [0.0; 2];
         if is_even && self.clouds.is_none() && self.moonlight.is_none() {
             return image.pixels_mut().fill(sky_e);
         }
@@ -79,6 +80,10 @@ impl<'a> Sky<'a> {
             let gradient_y = 1.0 + self.slope[1] * (y as f64 - centre.y);
             for (x, pixel) in row.iter_mut().enumerate() {
                 let place = PixelPoint::new(x as f64, y as f64);
+                if !is_pinhole && self.camera.direction_of(&place).is_none() {
+                    *pixel = 0.0;
+                    continue;
+                }
                 let gradient = gradient_y + self.slope[0] * (place.x - centre.x);
                 let moon = moon.as_ref().map_or(0.0, |grid| grid.at(x, y));
                 let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
@@ -221,7 +226,10 @@ impl Moonlight {
 
     /// Brightness at `place`, relative to the sky.
     fn at(&self, camera: &CameraModel, place: &PixelPoint) -> f64 {
-        let angle_rad = camera.direction_of(place).angle_to(&self.direction);
+        let Some(direction) = camera.direction_of(place) else {
+            return 0.0;
+        };
+        let angle_rad = direction.angle_to(&self.direction);
         let cosine = libm::cos(angle_rad);
         let rayleigh = libm::pow(10.0, 5.36) * (1.06 + cosine * cosine);
         let mie = libm::pow(10.0, 6.15 - angle_rad.to_degrees() / 40.0);

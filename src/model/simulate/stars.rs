@@ -55,7 +55,7 @@ impl StarSampler<'_> {
             .inverse()
             .apply(&UnitVector::BORESIGHT);
         // Margin for light from outside, and for proper motion.
-        let margin_rad = 2.0 * reach_px / self.camera.focal_length_px + PROPER_MOTION_ROOM_RAD;
+        let margin_rad = 2.0 * reach_px / self.camera.focal_length_px() + PROPER_MOTION_ROOM_RAD;
         let least_cosine = libm::cos((self.camera.radius_rad() + margin_rad).min(PI));
         let is_near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
         let near = stars.iter().enumerate().filter(|(_, star)| is_near(star));

@@ -39,7 +39,7 @@ pub(super) fn trails(
     exposure_s: f64,
     random: &mut ChaCha8Rng,
 ) -> Vec<Trail> {
-    let length_px = camera.focal_length_px * (scene.trail_rate_deg_s * exposure_s).to_radians();
+    let length_px = camera.focal_length_px() * (scene.trail_rate_deg_s * exposure_s).to_radians();
     let count = poisson(scene.trails, random) as usize;
     let mut trail = |_| {
         let middle = place(camera, random);

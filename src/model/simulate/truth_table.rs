@@ -46,10 +46,10 @@ pub fn truth_table(
 ) -> Vec<TruthRow> {
     let star = |star: &TrueStar| {
         let known = star.catalog.map(|index| catalog.star(index));
-        let sky = attitude.map(|icrs_to_camera| {
-            let direction = camera.direction_of(&star.position);
+        let sky = attitude.and_then(|icrs_to_camera| {
+            let direction = camera.direction_of(&star.position)?;
             let (ra_rad, dec_rad) = icrs_to_camera.inverse().apply(&direction).to_ra_dec();
-            [ra_rad, dec_rad].map(|rad| decimals(rad * DEG_PER_RAD, 8))
+            Some([ra_rad, dec_rad].map(|rad| decimals(rad * DEG_PER_RAD, 8)))
         });
         TruthRow {
             // Of a list, no star is false.

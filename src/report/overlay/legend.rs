@@ -100,12 +100,21 @@ fn field_line(solution: &Solution) -> String {
     let (boresight, _) = found.icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
     format!(
-        "RA {}  Dec {} · {:.2}° × {:.2}°",
+        "RA {}  Dec {} · {}",
         hours(ra_rad * DEG_PER_RAD, 1),
         degrees(dec_rad * DEG_PER_RAD, 0),
-        found.camera.fov_x_rad() * DEG_PER_RAD,
-        found.camera.fov_y_rad() * DEG_PER_RAD,
+        field_text(&found.camera),
     )
+}
+
+/// The angles that a camera sees.
+pub(crate) fn field_text(camera: &CameraModel) -> String {
+    match camera.fov_x_rad().zip(camera.fov_y_rad()) {
+        Some((x_rad, y_rad)) => {
+            format!("{:.2}° × {:.2}°", x_rad * DEG_PER_RAD, y_rad * DEG_PER_RAD)
+        }
+        None => format!("{:.0}° around the axis", camera.radius_rad() * DEG_PER_RAD),
+    }
 }
 
 /// Draws the number of detections of each kind, in the color of its rings.
@@ -222,7 +231,7 @@ pub(super) fn north_and_east(identification: &Identification) -> [[f32; 2]; 2] {
 
 /// Length of an angle across the centre, in pixels of the frame.
 fn length_px(camera: &CameraModel, angle_rad: f64) -> f64 {
-    2.0 * camera.focal_length_px * (angle_rad / 2.0).tan()
+    2.0 * camera.focal_length_px() * (angle_rad / 2.0).tan()
 }
 
 /// `text` cut to this width, in units.

@@ -4,17 +4,19 @@
 //! 80 characters in blocks of 2880 bytes
 //!
 //! Conventions are those of FITS. The centre of the first pixel of the file is (1, 1); `ROWORDER` says
-//! whether that is the top or the bottom of the picture. `CRPIX` is the frame's centre, `CRVAL` the boresight, `CD` in degrees per pixel; the determinant of `CD` has the other
-//! sign for a mirrored frame. A distortion is written in SIP form: `A` and `B` from observed to
-//! ideal (pinhole) offsets, exact; `AP` and `BP` back, fitted over the frame.
+//! whether that is the top or the bottom of the picture. `CRVAL` is the boresight: `CRPIX` is the frame's centre for a pinhole, and where the axis meets the
+//! frame for other lenses. `CD` is in degrees per pixel; its determinant has the other sign for a
+//! mirrored frame. A distortion is written in SIP form, fitted over the frame: `A` and `B` from pixels to
+//! the plane, `AP` and `BP` back.
 //!
 //! # Reference
-//! Calabretta & Greisen 2002, A&A 395, 1077 (`TAN`); Shupe et al. 2005, ASP Conf. 347, 491 (SIP);
+//! Calabretta & Greisen 2002, A&A 395, 1077 (`TAN`, `ZPN`); Shupe et al. 2005, ASP Conf. 347, 491 (SIP);
 //! FITS Standard 4.0 (2018), sect. 4 (cards) and 8 (world coordinates).
 
+mod plane;
 mod sip;
 
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
 use crate::frame::{FitsHeader, RowOrder};
@@ -22,6 +24,7 @@ use crate::identify::Identification;
 use crate::pipeline::{Outcome, Solution};
 use memchr::memmem;
 use nalgebra::{Matrix2, RowVector2, Vector3};
+use plane::Plane;
 use sip::{Polynomial, Sip};
 
 /// Start of the history that each header has.
@@ -89,9 +92,17 @@ pub fn add_projection(
     icrs_to_camera: &Rotation<Icrs, Camera>,
     row_order: RowOrder,
 ) {
-    let distortion = camera.distortion.as_ref();
-    let sip = distortion.map(|distortion| Sip::new(distortion, camera));
-    // The centre is the same pixel in both orders: only offsets from it change.
+    let plane = Plane::of(camera);
+    let reference = if camera.is_pinhole() {
+        camera.centre()
+    } else {
+        camera.axis()
+    };
+    let is_plain = camera.is_pinhole() && camera.distortion().is_none();
+    let place = |direction: &UnitVector<Camera>| plane.place_of(direction);
+    let sip = (!is_plain)
+        .then(|| Sip::new(camera, &reference, place))
+        .flatten();
     let (sip, rows) = match row_order {
         RowOrder::TopDown => (sip, 1.0),
         RowOrder::BottomUp => (sip.as_ref().map(Sip::with_rows_reversed), -1.0),
@@ -100,31 +111,32 @@ pub fn add_projection(
     let (boresight, _) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
     let (east, north) = sky_axes(icrs_to_camera);
-    let pinhole =
-        Matrix2::from_rows(&[east, north]) * mirror(camera) / camera.focal_length_px * DEG_PER_RAD;
+    let pinhole = Matrix2::from_rows(&[east, north]) * mirror(camera) / camera.focal_length_px()
+        * DEG_PER_RAD;
     let linear = sip
         .as_ref()
         .map_or_else(Matrix2::identity, |sip| sip.linear);
     let cd = pinhole * reversal * linear;
-    let centre = camera.centre();
-    let projection = if sip.is_some() {
-        ["RA---TAN-SIP", "DEC--TAN-SIP"]
-    } else {
-        ["RA---TAN", "DEC--TAN"]
+    let suffix = if sip.is_some() { "-SIP" } else { "" };
+    let row = match row_order {
+        RowOrder::TopDown => reference.y,
+        RowOrder::BottomUp => camera.height_px - 1.0 - reference.y,
     };
     header.integer("WCSAXES", 2, "");
-    header.text("CTYPE1", projection[0], "gnomonic projection");
-    header.text("CTYPE2", projection[1], "");
+    let (code, name) = plane.code_and_name();
+    header.text("CTYPE1", &format!("RA---{code}{suffix}"), name);
+    header.text("CTYPE2", &format!("DEC--{code}{suffix}"), "");
     header.text("CUNIT1", "deg", "");
     header.text("CUNIT2", "deg", "");
-    header.real("CRVAL1", ra_rad * DEG_PER_RAD, "RA of the centre");
-    header.real("CRVAL2", dec_rad * DEG_PER_RAD, "Dec of the centre");
-    header.real("CRPIX1", centre.x + 1.0, "first pixel is 1");
-    header.real("CRPIX2", centre.y + 1.0, "first pixel is 1");
+    header.real("CRVAL1", ra_rad * DEG_PER_RAD, "RA of the boresight");
+    header.real("CRVAL2", dec_rad * DEG_PER_RAD, "Dec of the boresight");
+    header.real("CRPIX1", reference.x + 1.0, "first pixel is 1");
+    header.real("CRPIX2", row + 1.0, "first pixel is 1");
     for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let keyword = format!("CD{}_{}", row + 1, column + 1);
         header.real(&keyword, cd[(row, column)], "degrees a pixel");
     }
+    plane.add_to(header);
     header.real("LONPOLE", 180.0, "");
     header.text("RADESYS", "ICRS", "");
     header.real("EQUINOX", 2000.0, "");
@@ -177,6 +189,14 @@ fn add_sip(header: &mut FitsHeader, sip: &Sip) {
     add("BP", &sip.inverse[1], "ideal to observed, along y");
 }
 
+fn field(camera: &CameraModel) -> String {
+    let degrees = |angle_rad: f64| angle_rad * DEG_PER_RAD;
+    match camera.fov_x_rad().zip(camera.fov_y_rad()) {
+        Some((x, y)) => format!("{:.4} x {:.4} deg", degrees(x), degrees(y)),
+        None => format!("{:.1} deg around the axis", degrees(camera.radius_rad())),
+    }
+}
+
 fn add_history(
     header: &mut FitsHeader,
     frame: &str,
@@ -192,10 +212,9 @@ fn add_history(
         format!("{SOLVED_BY} {}", env!("CARGO_PKG_VERSION")),
         format!("Image: {frame}"),
         format!(
-            "Field {:.4} x {:.4} deg, focal length {:.3} +- {:.3} px{}",
-            camera.fov_x_rad() * DEG_PER_RAD,
-            camera.fov_y_rad() * DEG_PER_RAD,
-            camera.focal_length_px,
+            "Field {}, focal length {:.3} +- {:.3} px{}",
+            field(camera),
+            camera.central_focal_length_px(),
             identification.focal_length_sigma_px,
             if camera.mirrored { ", mirrored" } else { "" },
         ),

@@ -1,14 +1,16 @@
-//! Lens distortion as SIP polynomials of pixel offsets.
+//! The mapping from a camera's pixels to a plane, as SIP polynomials of pixel offsets.
 
-use crate::base::coords::PixelPoint;
-use crate::camera::{CameraModel, Distortion};
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use crate::base::coords::{PixelPoint, UnitVector};
+use crate::camera::CameraModel;
+use nalgebra::{DMatrix, DVector, Matrix2};
 
-/// Highest order of the inverse; keywords have one digit per power.
-const MAX_INVERSE_ORDER: usize = 9;
-/// Largest accepted error of the inverse on the frame, in pixels.
-const INVERSE_TOLERANCE_PX: f64 = 1e-3;
-/// Points per side on which the inverse is fitted, denser towards the borders.
+/// Highest order; keywords have one digit per power.
+const MAX_ORDER: usize = 9;
+/// Lowest order, to tell the linear part from the rest.
+const MIN_ORDER: usize = 3;
+/// Error at which no higher order is tried, in pixels.
+const TOLERANCE_PX: f64 = 1e-5;
+/// Points per side on which the polynomials are fitted, denser towards the borders.
 const FIT_POINTS: usize = 24;
 /// How far the points reach, in units of the frame's half side.
 const FIT_REACH: f64 = 1.02;
@@ -21,9 +23,10 @@ pub(super) struct Polynomial {
     coefficients: Vec<f64>,
 }
 
-/// The pairs of powers (p, q) of a polynomial of this order: p + q ≤ order.
+/// The pairs of powers (p, q) of a polynomial of this order without a constant: 1 ≤ p + q ≤ order.
 fn powers(order: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..=order).flat_map(move |p| (0..=order - p).map(move |q| (p, q)))
+    let all = (0..=order).flat_map(move |p| (0..=order - p).map(move |q| (p, q)));
+    all.skip(1)
 }
 
 impl Polynomial {
@@ -50,13 +53,13 @@ impl Polynomial {
     }
 }
 
-/// A distortion in SIP form.
+/// The mapping from pixels to a plane, in SIP form.
 ///
-/// SIP polynomials have no terms of first order: with observed offsets U in the file's axes, ideal
-/// offset = `linear` (U + `forward`(U)).
+/// SIP polynomials have no terms of first order: with offsets U from the pixel in the boresight, along
+/// the file's axes, a place in the plane is `linear` (U + `forward`(U)), in pixels.
 #[derive(Debug, Clone)]
 pub(super) struct Sip {
-    /// The linear part of the distortion, a factor of `CD`.
+    /// A factor of `CD`.
     pub(super) linear: Matrix2<f64>,
     /// `A` and `B`.
     pub(super) forward: [Polynomial; 2],
@@ -65,15 +68,59 @@ pub(super) struct Sip {
 }
 
 impl Sip {
-    /// The distortion of `camera`.
-    pub(super) fn new(distortion: &Distortion, camera: &CameraModel) -> Self {
-        let (linear, forward) = expand(distortion, camera.mirrored);
-        let inverse = invert(&forward, camera);
-        Self {
+    /// The mapping of `camera`, whose boresight is at `reference`; `plane` is where a direction is on
+    /// the plane, in units of the focal length. `None` where its pixels do not determine it.
+    pub(super) fn new(
+        camera: &CameraModel,
+        reference: &PixelPoint,
+        plane: impl Fn(&UnitVector<crate::base::coords::Camera>) -> [f64; 2],
+    ) -> Option<Self> {
+        let focal_px = camera.focal_length_px();
+        let mirror = if camera.mirrored { -1.0 } else { 1.0 };
+        let seen = pixels(camera).into_iter().filter_map(|pixel| {
+            let [x, y] = plane(&camera.direction_of(&pixel)?);
+            let offset = [pixel.x - reference.x, pixel.y - reference.y];
+            Some((offset, [mirror * focal_px * x, focal_px * y]))
+        });
+        let (offsets, places): (Vec<[f64; 2]>, Vec<[f64; 2]>) = seen.unzip();
+        let scale_px = camera.radius_px();
+        let whole = fit_best(&offsets, &places, scale_px)?;
+        let linear_of = |axis: usize| {
+            let of = |powers: (usize, usize)| {
+                let mut terms = whole[axis].terms();
+                terms
+                    .find(|(p, q, _)| (*p, *q) == powers)
+                    .map_or(0.0, |(_, _, value)| value)
+            };
+            [of((1, 0)), of((0, 1))]
+        };
+        let ([xx, xy], [yx, yy]) = (linear_of(0), linear_of(1));
+        let linear = Matrix2::new(xx, xy, yx, yy);
+        let back = linear.try_inverse()?;
+        let forward = |axis: usize| {
+            let terms = whole[0].terms().zip(whole[1].terms());
+            let higher = |((p, q, x), (_, _, y)): ((usize, usize, f64), (usize, usize, f64))| {
+                let value = back[(axis, 0)] * x + back[(axis, 1)] * y;
+                if p + q == 1 { 0.0 } else { value }
+            };
+            Polynomial {
+                order: whole[axis].order,
+                coefficients: terms.map(higher).collect(),
+            }
+        };
+        let straight: Vec<[f64; 2]> = places
+            .iter()
+            .map(|[x, y]| [0, 1].map(|axis| back[(axis, 0)] * x + back[(axis, 1)] * y))
+            .collect();
+        let shift = |(offset, straight): (&[f64; 2], &[f64; 2])| {
+            [offset[0] - straight[0], offset[1] - straight[1]]
+        };
+        let shifts: Vec<[f64; 2]> = offsets.iter().zip(&straight).map(shift).collect();
+        Some(Self {
             linear,
-            forward,
-            inverse,
-        }
+            forward: [forward(0), forward(1)],
+            inverse: fit_best(&straight, &shifts, scale_px)?,
+        })
     }
 
     /// The same for offsets whose second coordinate has the other sign.
@@ -89,101 +136,64 @@ impl Sip {
     }
 }
 
-/// Splits the distortion into its linear part and the polynomials of higher order.
-fn expand(distortion: &Distortion, mirrored: bool) -> (Matrix2<f64>, [Polynomial; 2]) {
-    let order = distortion.model().order();
-    let sign: f64 = if mirrored { -1.0 } else { 1.0 };
-    let count = powers(order).count();
-    let mut linear = Matrix2::identity();
-    let mut higher = vec![Vector2::zeros(); count];
-    for (p, q, along) in distortion.monomials() {
-        let scale = distortion.radius_px().powi((p + q) as i32);
-        // With x reversed, u changes sign as a variable and as a result.
-        let flip = sign * sign.powi(p as i32);
-        let flipped = Vector2::new(along[0] * flip, along[1] * sign.powi(p as i32)) / scale;
-        match (p, q) {
-            (1, 0) => linear.set_column(0, &(linear.column(0) + flipped)),
-            (0, 1) => linear.set_column(1, &(linear.column(1) + flipped)),
-            _ => {
-                if let Some(index) = powers(order).position(|powers| powers == (p, q)) {
-                    higher[index] += flipped;
-                }
-            }
-        }
-    }
-    // `linear` is close to the identity: lenses do not fold the image.
-    let inverse = linear.try_inverse().unwrap_or_else(Matrix2::identity);
-    let polynomial = |axis: usize| Polynomial {
-        order,
-        coefficients: higher.iter().map(|term| (inverse * term)[axis]).collect(),
-    };
-    (linear, [polynomial(0), polynomial(1)])
-}
-
-/// The inverse of `forward` over the frame, of the lowest order that is accurate enough.
-fn invert(forward: &[Polynomial; 2], camera: &CameraModel) -> [Polynomial; 2] {
-    let half = [camera.width_px / 2.0, camera.height_px / 2.0];
-    let points = points(half);
-    let ideal = points.iter().map(|&at| {
-        let shift = [forward[0].at(at), forward[1].at(at)];
-        [at[0] + shift[0], at[1] + shift[1]]
-    });
-    let ideal: Vec<[f64; 2]> = ideal.collect();
-    let mut best: Option<(f64, [Polynomial; 2])> = None;
-    for order in forward[0].order..=MAX_INVERSE_ORDER {
-        let Some(fitted) = fit(order, &points, &ideal, camera.radius_px()) else {
-            break;
-        };
-        let error_px = points.iter().zip(&ideal).map(|(at, there)| {
-            let back = [
-                there[0] + fitted[0].at(*there),
-                there[1] + fitted[1].at(*there),
-            ];
-            PixelPoint::new(back[0], back[1]).distance_to(&PixelPoint::new(at[0], at[1]))
-        });
-        let error_px = error_px.fold(0.0, f64::max);
-        if best.as_ref().is_none_or(|(least, _)| error_px < *least) {
-            best = Some((error_px, fitted));
-        }
-        if error_px < INVERSE_TOLERANCE_PX {
-            break;
-        }
-    }
-    best.map_or_else(|| forward.clone(), |(_, inverse)| inverse)
-}
-
-/// Offsets on the frame, denser towards its borders, where polynomials are worst.
-fn points(half: [f64; 2]) -> Vec<[f64; 2]> {
+/// Pixels all over the frame, denser towards its borders, where polynomials are worst.
+fn pixels(camera: &CameraModel) -> Vec<PixelPoint> {
     let node = |i: usize| {
         let angle = (i as f64 + 0.5) / FIT_POINTS as f64 * std::f64::consts::PI;
         let outermost = (0.5 / FIT_POINTS as f64 * std::f64::consts::PI).cos();
-        FIT_REACH * angle.cos() / outermost
+        0.5 * FIT_REACH * angle.cos() / outermost
     };
-    (0..FIT_POINTS)
-        .flat_map(|i| (0..FIT_POINTS).map(move |j| [half[0] * node(i), half[1] * node(j)]))
-        .collect()
+    let centre = camera.centre();
+    let at = |i: usize, j: usize| {
+        PixelPoint::new(
+            centre.x + camera.width_px * node(i),
+            centre.y + camera.height_px * node(j),
+        )
+    };
+    let rows = |i: usize| (0..FIT_POINTS).map(move |j| at(i, j));
+    (0..FIT_POINTS).flat_map(rows).collect()
 }
 
-/// Fits by least squares the polynomials of ideal offsets that give the shift to observed ones.
-fn fit(
-    order: usize,
-    observed: &[[f64; 2]],
-    ideal: &[[f64; 2]],
-    radius_px: f64,
-) -> Option<[Polynomial; 2]> {
+/// The polynomials of the lowest order that map `from` to `to` well enough, or of the order that does
+/// it best.
+fn fit_best(from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64) -> Option<[Polynomial; 2]> {
+    let mut best: Option<(f64, [Polynomial; 2])> = None;
+    for order in MIN_ORDER..=MAX_ORDER {
+        let Some(fitted) = fit(order, from, to, scale_px) else {
+            break;
+        };
+        let errors_px = from.iter().zip(to).map(|(from, to)| {
+            let [x, y] = [0, 1].map(|axis: usize| fitted[axis].at(*from) - to[axis]);
+            x.hypot(y)
+        });
+        let error_px = errors_px.fold(0.0, f64::max);
+        if best.as_ref().is_none_or(|(least, _)| error_px < *least) {
+            best = Some((error_px, fitted));
+        }
+        if error_px < TOLERANCE_PX {
+            break;
+        }
+    }
+    best.map(|(_, fitted)| fitted)
+}
+
+/// Fits by least squares the polynomials that map `from` to `to`.
+fn fit(order: usize, from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64) -> Option<[Polynomial; 2]> {
     let terms: Vec<(usize, usize)> = powers(order).collect();
-    // In units of the radius, so that high powers stay of order one.
-    let design = DMatrix::from_fn(ideal.len(), terms.len(), |row, column| {
-        let ([u, v], (p, q)) = (ideal[row], terms[column]);
-        (u / radius_px).powi(p as i32) * (v / radius_px).powi(q as i32)
+    if from.len() < terms.len() {
+        return None;
+    }
+    // In units of the scale, so that high powers stay of order one.
+    let design = DMatrix::from_fn(from.len(), terms.len(), |row, column| {
+        let ([u, v], (p, q)) = (from[row], terms[column]);
+        (u / scale_px).powi(p as i32) * (v / scale_px).powi(q as i32)
     });
     let decomposed = design.svd(true, true);
     let solve = |axis: usize| {
-        let shift = |(o, i): (&[f64; 2], &[f64; 2])| o[axis] - i[axis];
-        let shifts = DVector::from_iterator(observed.len(), observed.iter().zip(ideal).map(shift));
-        let solved = decomposed.solve(&shifts, 1e-12).ok()?;
+        let wanted = DVector::from_iterator(to.len(), to.iter().map(|to| to[axis]));
+        let solved = decomposed.solve(&wanted, 1e-12).ok()?;
         let coefficient =
-            |(value, (p, q)): (&f64, &(usize, usize))| value / radius_px.powi((p + q) as i32);
+            |(value, (p, q)): (&f64, &(usize, usize))| value / scale_px.powi((p + q) as i32);
         Some(Polynomial {
             order,
             coefficients: solved.iter().zip(&terms).map(coefficient).collect(),

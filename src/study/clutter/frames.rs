@@ -175,7 +175,7 @@ fn with_clutter(
             scene.cloud_size_px = share * camera.width_px;
         }
         Kind::Trails => {
-            let turn_rad = TRAIL_PX / std::f64::consts::FRAC_PI_4 / camera.focal_length_px;
+            let turn_rad = TRAIL_PX / std::f64::consts::FRAC_PI_4 / camera.focal_length_px();
             let exposure_s = setup.scenario.conditions.exposure_s;
             scene.tumble_deg_s = turn_rad * DEG_PER_RAD / exposure_s;
         }
@@ -184,7 +184,7 @@ fn with_clutter(
             let stars = indexed.catalog().stars();
             let bright = stars.partition_point(|star| f64::from(star.v_mag) <= limit_vmag);
             let sphere_sq_deg = 4.0 * std::f64::consts::PI / RAD_PER_DEG.powi(2);
-            let frame_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
+            let frame_sq_deg = camera.solid_angle_sr() * DEG_PER_RAD.powi(2);
             scene.false_stars += bright as f64 * frame_sq_deg / sphere_sq_deg;
         }
         Kind::Blends => setup.scenario.camera.focal_length_mm /= 2.0,

@@ -147,7 +147,7 @@ fn shifted(
     camera: &CameraModel,
     [dx, dy]: [f64; 2],
 ) -> Rotation<Icrs, Camera> {
-    let radian = |px: f64| px / camera.focal_length_px;
+    let radian = |px: f64| px / camera.focal_length_px();
     let dx = if camera.mirrored { -dx } else { dx };
     pointing
         .icrs_to_camera

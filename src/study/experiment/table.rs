@@ -134,7 +134,7 @@ impl FieldReport {
             ra_deg: degrees(ra_rad),
             dec_deg: degrees(dec_rad),
             up_pa_deg: degrees(up_pa_rad),
-            pixel_scale_arcsec: to_decimals(ARCSEC_PER_RAD / found.camera.focal_length_px, 4),
+            pixel_scale_arcsec: to_decimals(ARCSEC_PER_RAD / found.camera.focal_length_px(), 4),
             mirrored: found.camera.mirrored,
             rms_px: to_decimals(found.rms_px, 3),
             log10_false_alarm: to_decimals(found.log10_false_alarm, 1),

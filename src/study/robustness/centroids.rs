@@ -162,7 +162,7 @@ fn false_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) ->
 
 /// The magnitude limit that gives the requested mean number of stars on a frame.
 fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, indexed: &IndexedCatalog) -> f64 {
-    let area_sq_deg = camera.fov_x_rad() * camera.fov_y_rad() * DEG_PER_RAD.powi(2);
+    let area_sq_deg = camera.solid_angle_sr() * DEG_PER_RAD.powi(2);
     indexed.magnitude_of_density(protocol.mean_stars / area_sq_deg)
 }
 

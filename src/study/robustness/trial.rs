@@ -32,14 +32,15 @@ impl Answer {
         const TOLERANCE: f64 = 0.01;
         let (right, bottom) = (camera.width_px - 1.0, camera.height_px - 1.0);
         let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
-        let tolerance_rad = TOLERANCE * camera.fov_x_rad();
+        let tolerance_rad = TOLERANCE * camera.width_px / camera.focal_length_px();
         let is_right = |pixel: PixelPoint| {
-            let true_direction = icrs_to_camera.inverse().apply(&camera.direction_of(&pixel));
-            let direction = found
-                .icrs_to_camera
-                .inverse()
-                .apply(&found.camera.direction_of(&pixel));
-            direction.angle_to(&true_direction) <= tolerance_rad
+            let Some(truth) = camera.direction_of(&pixel) else {
+                return true;
+            };
+            let truth = icrs_to_camera.inverse().apply(&truth);
+            let direction = found.camera.direction_of(&pixel);
+            let direction = direction.map(|d| found.icrs_to_camera.inverse().apply(&d));
+            direction.is_some_and(|d| d.angle_to(&truth) <= tolerance_rad)
         };
         let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
         if is_right(camera.centre()) && corners.into_iter().all(is_right) {

@@ -370,7 +370,7 @@ impl<'a> Evaluation<'a> {
         let nees = factor.map(|factor| error_rad.dot(&factor.solve(&error_rad)));
         let error_arcsec = error_rad * ARCSEC_PER_RAD;
         let sigma_arcsec = found.attitude_sigma_rad().map(|rad| rad * ARCSEC_PER_RAD);
-        let true_focal_px = self.validator.simulator.camera().focal_length_px;
+        let true_focal_px = self.validator.simulator.camera().central_focal_length_px();
         let some = |value: f64| Some(significant(value));
         Some(FrameRecord {
             error_x_arcsec: some(error_arcsec.x),
@@ -380,7 +380,7 @@ impl<'a> Evaluation<'a> {
             sigma_y_arcsec: some(sigma_arcsec[1]),
             sigma_roll_arcsec: some(sigma_arcsec[2]),
             nees: nees.map(significant),
-            focal_error_px: some(found.camera.focal_length_px - true_focal_px),
+            focal_error_px: some(found.camera.central_focal_length_px() - true_focal_px),
             focal_sigma_px: some(found.focal_length_sigma_px),
             rms_px: some(found.rms_px),
             ..FrameRecord::default()

@@ -37,37 +37,37 @@ pub const HARD_SUITE: [HardCase; 19] = [
     HardCase {
         name: "lens-r3",
         what: "lens with r³: 25 thousandths in the corner",
-        change: |setup| lens(setup, [25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |setup| lens(setup, [25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "lens-r3-r5",
         what: "r³ and r⁵: 25 thousandths",
-        change: |setup| lens(setup, [17.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |setup| lens(setup, [17.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "lens-strong",
         what: "r³ and r⁵: 62 thousandths",
-        change: |setup| lens(setup, [83.0, -21.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |setup| lens(setup, [83.0, -21.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "lens-r3-r5-r7",
         what: "r³, r⁵ and r⁷ of alternating sign",
-        change: |setup| lens(setup, [-69.0, 41.0, -17.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |setup| lens(setup, [-69.0, 41.0, -17.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "lens-5-percent",
         what: "5 % at half of the width of a square frame",
-        change: |setup| lens(setup, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |setup| lens(setup, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "lens-decentred",
         what: "r³ and r⁵, decentred",
-        change: |setup| lens(setup, [28.0, -11.0, 0.0, 2.8, -1.4, 0.0, 0.0]),
+        change: |setup| lens(setup, [28.0, -11.0, 0.0, 0.0, 0.0, 2.8, -1.4, 0.0, 0.0]),
     },
     HardCase {
-        name: "detector-tilted",
-        what: "r³, and a tilted detector",
-        change: |setup| lens(setup, [-21.0, 0.0, 0.0, 0.0, 0.0, 4.0, 3.0]),
+        name: "lens-off-centre",
+        what: "r³, and the axis 2 % of half of the diagonal off the centre",
+        change: |setup| lens(setup, [-50.0, 0.0, 0.0, 16.0, 12.0, 0.0, 0.0, 0.0, 0.0]),
     },
     HardCase {
         name: "spot-disc",
@@ -158,10 +158,12 @@ fn lens(setup: &mut Setup, thousandths: [f64; LENS_TERMS]) {
         made.distortion_px,
         made.distortion5_px,
         made.distortion7_px,
+        made.axis_x_px,
+        made.axis_y_px,
         made.decentring_x_px,
         made.decentring_y_px,
-        made.tilt_x_px,
-        made.tilt_y_px,
+        made.stretch_px,
+        made.skew_px,
     ] = thousandths.map(|displacement| displacement * unit_px);
 }
 

@@ -138,7 +138,7 @@ fn trial(
         pulls: std::array::from_fn(|axis| turn[axis] / sigma_rad[axis]),
         nees: turn.dot(&(found.attitude_covariance_rad2.try_inverse().unwrap() * turn)),
         matches: found.matches.len(),
-        distorted: found.camera.distortion.is_some(),
+        distorted: found.camera.distortion().is_some(),
         sigma_arcsec: sigma_rad.map(|s| s.to_degrees() * 3600.0),
         centroid_pulls: found.matches.iter().filter_map(of_star).collect(),
     })

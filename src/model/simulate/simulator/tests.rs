@@ -15,7 +15,7 @@ fn pointing() -> Pointing {
 
 /// A star of V = 2 at this position.
 fn star_at(camera: &CameraModel, x: f64, y: f64) -> Star {
-    let direction = camera.direction_of(&PixelPoint::new(x, y));
+    let direction = camera.direction_of(&PixelPoint::new(x, y)).unwrap();
     let on_sky = pointing().icrs_to_camera.inverse().apply(&direction);
     Star::new(StarId::Number(1), on_sky, 2.0)
 }
@@ -29,7 +29,7 @@ fn small() -> Scenario {
 #[test]
 fn square_pixels_have_the_area_of_those_that_are_not() {
     let sheet = Preset::Experiment1.data_sheet();
-    let scale_rad = 1.0 / camera_of(&sheet).focal_length_px;
+    let scale_rad = 1.0 / camera_of(&sheet).focal_length_px();
     assert!((scale_rad * scale_rad / sheet.pixel_solid_angle_sr() - 1.0).abs() < 1e-12);
 }
 
@@ -39,7 +39,9 @@ fn distortion_moves_the_corner_by_as_much_as_is_asked_for() {
     let plain = camera_of(&sheet);
     let moved = |sheet: &DataSheet, place: PixelPoint| {
         let camera = camera_of(sheet);
-        let there = camera.pixel_of(&plain.direction_of(&place)).unwrap();
+        let there = camera
+            .pixel_of(&plain.direction_of(&place).unwrap())
+            .unwrap();
         [there.x - place.x, there.y - place.y]
     };
     let corner = PixelPoint::new(299.5, 199.5);

@@ -28,6 +28,7 @@ struct Identity<'a> {
     camera: &'a str,
     reading: Reading,
     spot_form: &'a str,
+    projection: &'a str,
     mirrored: bool,
     parameters: Map<String, Value>,
     /// Wavelengths in nm and values, if it is a curve.
@@ -101,6 +102,7 @@ fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json:
         camera: &scenario.camera.name,
         reading: scenario.reading,
         spot_form: imperfections.spot_form.name(),
+        projection: imperfections.projection.name(),
         mirrored: imperfections.mirrored,
         parameters: parameters.collect(),
         lens_transmission_curve: curve(&scenario.camera.lens_transmission),
