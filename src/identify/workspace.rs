@@ -514,11 +514,12 @@ fn known_part(
     icrs_to_camera: &Rotation<Icrs, Camera>,
     matches: &[StarMatch],
 ) -> CameraModel {
-    /// Stars may be this much farther from the axis than the outermost that is named, in radians; and
-    /// where that is nearly in the corners, everywhere.
+    /// Frames whose corners are nearer to the axis than this see the sky all over.
+    const WIDE_RAD: f64 = 60.0 * RAD_PER_DEG;
+    /// Stars may be this much farther from the axis than the outermost that is named.
     const MARGIN_RAD: f64 = RAD_PER_DEG;
-    const NEARLY: f64 = 0.9;
-    if camera.is_pinhole() {
+    let corners_rad = camera.radius_rad();
+    if camera.is_pinhole() || corners_rad < WIDE_RAD {
         return *camera;
     }
     let angle_rad = |star: &StarMatch| {
@@ -526,12 +527,7 @@ fn known_part(
         direction.angle_to(&UnitVector::BORESIGHT)
     };
     let outermost_rad = matches.iter().map(angle_rad).fold(0.0, f64::max);
-    let corners_rad = camera.radius_rad();
-    if outermost_rad > NEARLY * corners_rad {
-        camera.limited_to(corners_rad)
-    } else {
-        camera.limited_to(outermost_rad + MARGIN_RAD)
-    }
+    camera.limited_to(corners_rad.min(outermost_rad + MARGIN_RAD))
 }
 
 fn identification(
