@@ -193,12 +193,19 @@ impl Distortion {
 
     /// The displacement by the monomials at an ideal offset in units of R, and its derivatives by the
     /// offset, in the same units.
-    #[inline]
+    #[inline(always)]
     fn irregular(&self, offset: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
-        let (mut moved, mut by_ideal) = ([0.0; 2], [[0.0; 2]; 2]);
         if self.model < DistortionModel::Irregular3 {
-            return (moved, by_ideal);
+            ([0.0; 2], [[0.0; 2]; 2])
+        } else {
+            self.sum_of_monomials(offset)
         }
+    }
+
+    /// Out of line: hardly any camera has them.
+    #[inline(never)]
+    fn sum_of_monomials(&self, offset: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+        let (mut moved, mut by_ideal) = ([0.0; 2], [[0.0; 2]; 2]);
         let coefficients = self.coefficients_px[LENS_TERMS..].as_chunks::<2>().0;
         let values = monomials(offset).into_iter().zip(monomial_slopes(offset));
         for (coefficients, (value, slopes)) in coefficients.iter().zip(values) {

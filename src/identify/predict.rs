@@ -14,8 +14,8 @@ const LANES: usize = 8;
 /// Margin around a view, in units of its radius, within which stars are gathered, as the next view
 /// differs a little.
 const GATHERED_MARGIN: f64 = 0.04;
-/// Room for proper motion in the first, rough test of a star, in margins.
-const NEAR: f64 = 5.0;
+/// Room in the first, rough test of a star, in margins.
+const NEAR: f64 = 3.0;
 /// Magnitudes to go deeper where the stars are too few.
 const DEEPER_MAG: f64 = 0.7;
 
@@ -177,6 +177,35 @@ impl Surroundings {
     }
 }
 
+/// Largest tangents of the angles from the boresight, along x and y, of what a pinhole sees on its frame
+/// and nearly so. `None` where it does not see all of the frame, and for other lenses.
+fn tangent_reach(camera: &CameraModel, margin_px: f64) -> Option<[f64; 2]> {
+    if !camera.is_pinhole() {
+        return None;
+    }
+    let centre = camera.centre();
+    let [top_left, .., bottom_right] = camera.corners();
+    let columns = [top_left.x, centre.x, bottom_right.x];
+    let rows = [top_left.y, centre.y, bottom_right.y];
+    let mut reach = [0.0_f64; 2];
+    for x in columns {
+        for y in rows {
+            let direction = camera.direction_of(&PixelPoint::new(x, y))?;
+            let d = direction.as_vector();
+            if d.z <= 0.0 {
+                return None;
+            }
+            reach = [
+                reach[0].max((d.x / d.z).abs()),
+                reach[1].max((d.y / d.z).abs()),
+            ];
+        }
+    }
+    // Between these places a border may bulge.
+    let margin = NEAR * margin_px / camera.focal_length_px();
+    Some(reach.map(|along| along + margin))
+}
+
 /// Fills `predicted` with those of `stars` (brightest first) that lie in the frame or nearly so,
 /// until both the number and the magnitude of `least` are reached.
 fn project(
@@ -189,17 +218,16 @@ fn project(
     let camera = view.camera;
     let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
     let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
-    // The cone is larger than the frame: a quick test rejects most stars outside it. Stars move by less
-    // than the margin until the date of the frame.
+    // The cone is larger than the frame: a quick test rejects most stars outside it.
+    let reach = tangent_reach(camera, margin_px);
     let is_near = |star: &&GridStar| {
-        let direction = UnitVector::from_unit(view.icrs_to_camera.matrix() * star.vector());
-        let pixel = camera.pixel_of(&direction);
-        pixel.is_some_and(|pixel| camera.nearly_contains(&pixel, NEAR * margin_px))
+        let d = view.icrs_to_camera.matrix() * star.vector();
+        reach.is_none_or(|[x, y]| d.z > 0.0 && d.x.abs() <= x * d.z && d.y.abs() <= y * d.z)
     };
     let mut near = stars
         .iter()
-        .filter(|star| star.is_within(boresight.as_vector(), chord * chord))
-        .filter(is_near);
+        .filter(is_near)
+        .filter(|star| star.is_within(boresight.as_vector(), chord * chord));
     predicted.clear();
     loop {
         let mut lanes = [None; LANES];

@@ -218,9 +218,16 @@ impl Workspace {
                 fields.map(|field| Choice::new(of(field), SearchPlan::coarse(*effort)))
             });
             let of_whole = coarser.map(|_| Choice::new(whole, SearchPlan::votes(*effort)));
-            let windows = windows.of(field).iter().map(|window| Choice {
-                window: Some(window),
-                ..Choice::new(of(&window.field), SearchPlan::window(*effort))
+            let windows = windows.of(field).iter().map(|window| {
+                let plan = if window.is_central {
+                    SearchPlan::coarse(*effort)
+                } else {
+                    SearchPlan::window(*effort)
+                };
+                Choice {
+                    window: Some(window),
+                    ..Choice::new(of(&window.field), plan)
+                }
             });
             let thinned = thinning.thin(field);
             let other_stars = SearchPlan::other_stars(*effort);
@@ -234,8 +241,8 @@ impl Workspace {
             });
             let choices = coarse
                 .chain(of_whole)
-                .chain(windows)
                 .chain(thinned)
+                .chain(windows)
                 .chain(tiers);
             for choice in choices {
                 (search, found) = choice.search(search, whole, priors);

@@ -24,6 +24,7 @@ mod frames;
 mod identify;
 mod interrupt;
 mod layering;
+mod lenses;
 mod limit;
 mod limits;
 mod no_sky;

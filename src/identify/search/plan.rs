@@ -16,7 +16,7 @@ pub const WORK_OF_VOTE: u64 = 3;
 const WORK: u64 = 850_000;
 const WORK_OF_OTHERS: u64 = 400_000;
 /// The same in each window.
-const WORK_OF_WINDOW: u64 = 400_000;
+const WORK_OF_WINDOW: u64 = 60_000;
 
 /// Some of the triangles of the brightest stars.
 pub struct SearchPass {
@@ -88,7 +88,7 @@ impl SearchPlan {
         }
     }
 
-    /// A window of the frame.
+    /// A window of the frame that is not in its middle.
     pub const fn window(effort: Effort) -> Self {
         Self {
             max_work: effort.work(WORK_OF_WINDOW),

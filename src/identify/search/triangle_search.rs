@@ -541,8 +541,8 @@ impl<'a> Search<'a> {
     /// log10 of the probability that as many stars agree by chance. Where the stars that were searched
     /// do not show it, those below brighter detections may.
     fn log10_of_agreement(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
-        /// Searches of other choices of stars, before those of the tiers.
-        const BEFORE_TIERS: u32 = 5;
+        /// Searches of other choices of stars and of windows, before those of the tiers.
+        const BEFORE_TIERS: u32 = 15;
         let log10 = self.log10_with(hypothesis, TESTED_STARS)?;
         if log10 <= LOG10_FALSE_ALARM_LIMIT {
             return Some(log10);

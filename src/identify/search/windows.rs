@@ -32,7 +32,8 @@ pub struct Window {
     pub field: StarField,
     /// Its first pixel in the frame.
     corner: PixelPoint,
-    is_central: bool,
+    /// Whether it is in the middle of the frame.
+    pub is_central: bool,
 }
 
 impl Window {

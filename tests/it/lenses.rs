@@ -1,0 +1,207 @@
+//! Lenses that are no pinholes, through the program: simulated ones, and photographs of the whole sky.
+
+use crate::common::{Ran, Truth, number, shared_dir, starpipe};
+use serde_json::Value;
+use std::path::Path;
+
+fn report(ran: &Ran) -> Value {
+    ran.reports().remove(0)
+}
+
+fn simulated(out: &Path, projection: &str, more: &[&str]) -> Value {
+    let ran = Ran::new(
+        starpipe()
+            .args([
+                "simulate",
+                "--format=json",
+                "--preset=imx174-35mm",
+                "--seed=3",
+            ])
+            .args([
+                "--width-px=1280",
+                "--height-px=960",
+                "--pitch-x-um=4",
+                "--pitch-y-um=4",
+            ])
+            .args(["--aperture-mm=1.2", "--exposure=10"])
+            .arg(format!("--projection={projection}"))
+            .arg(format!("--out={}", out.display()))
+            .args(more),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    report(&ran)
+}
+
+#[test]
+fn frames_of_the_whole_sky_are_identified_with_nothing_given() {
+    /// Tolerance of the attitude and the focal length, in standard errors.
+    const SIGMAS: f64 = 5.0;
+    let directory = tempfile::tempdir().unwrap();
+    let frames: [(&str, &[&str]); 3] = [
+        (
+            "equidistant",
+            &[
+                "--focal-length-mm=1.2",
+                "--axis-x-px=14",
+                "--axis-y-px=-9",
+                "--distortion-px=-12",
+                "--ra=310",
+                "--dec=40",
+                "--roll=25",
+            ],
+        ),
+        (
+            "stereographic",
+            &[
+                "--focal-length-mm=0.9",
+                "--ra=80",
+                "--dec=-35",
+                "--roll=-120",
+                "--mirrored",
+            ],
+        ),
+        (
+            "equisolid",
+            &[
+                "--focal-length-mm=1.25",
+                "--decentring-x-px=2",
+                "--ra=190",
+                "--dec=55",
+                "--roll=70",
+            ],
+        ),
+    ];
+    for (projection, more) in frames {
+        let frame = directory.path().join(format!("{projection}.tif"));
+        let made = simulated(&frame, projection, more);
+        let out = directory.path().join("out");
+        let ran = Ran::new(
+            starpipe()
+                .args(["process", "--format=json", "--out"])
+                .args([&out, &frame]),
+        );
+        let found = report(&ran);
+        assert_eq!(
+            found["status"], "identified",
+            "{projection}: {}",
+            found["reason"]
+        );
+        let (attitude, optics) = (&found["attitude"], &found["optics"]);
+        assert_eq!(attitude["at"], "axis");
+        assert_ne!(optics["model"], "pinhole");
+        assert_eq!(optics["mirrored"], made["mirrored"]);
+        assert_eq!(
+            (&optics["fov_y_deg"], &made["fov_x_deg"]),
+            (&Value::Null, &Value::Null)
+        );
+        let valid_to_deg = number(&found, "/optics/valid_to_deg");
+        assert!(
+            (70.0..91.5).contains(&valid_to_deg),
+            "{projection}: {valid_to_deg}"
+        );
+        let truth = Truth {
+            ra_deg: number(&made, "/attitude/ra_deg"),
+            dec_deg: number(&made, "/attitude/dec_deg"),
+            fov_x_deg: f64::NAN,
+        };
+        let sigma = |axis: &str| number(&found, &format!("/attitude/sigma_arcsec/{axis}"));
+        let off_arcsec = truth.centre_error_deg(&found) * 3600.0;
+        let limit_arcsec = SIGMAS * sigma("x").hypot(sigma("y"));
+        assert!(
+            off_arcsec < limit_arcsec,
+            "{projection}: {off_arcsec} {limit_arcsec}"
+        );
+        let focal_px =
+            number(&found, "/optics/focal_length_px") - number(&made, "/focal_length_px");
+        let sigma_px = number(&found, "/optics/focal_length_sigma_px");
+        assert!(
+            focal_px.abs() < SIGMAS * sigma_px,
+            "{projection}: {focal_px} {sigma_px}"
+        );
+        let header = std::fs::read(out.join(format!("{projection}.wcs"))).unwrap();
+        assert!(
+            header
+                .chunks(80)
+                .any(|card| card.starts_with(b"CTYPE1  = 'RA---ZPN-SIP'"))
+        );
+    }
+}
+
+#[test]
+fn photographs_of_the_whole_sky_are_identified_with_nothing_given() {
+    let Some(shared) = shared_dir() else {
+        return;
+    };
+    for (name, stars, valid_to_deg) in [
+        ("allsky-2015.png", 90.0, 60.0),
+        ("allsky-svalbard.jpg", 1500.0, 75.0),
+        ("allsky-toscano.jpg", 700.0, 70.0),
+    ] {
+        let frame = shared.join("frames/hard").join(name);
+        let found = report(&Ran::new(
+            starpipe().args(["process", "--format=json"]).arg(frame),
+        ));
+        assert_eq!(found["status"], "identified", "{name}: {}", found["reason"]);
+        assert_ne!(found["optics"]["model"], "pinhole", "{name}");
+        assert!(number(&found, "/match/matched") > stars, "{name}");
+        assert!(number(&found, "/match/rms_px") < 1.0, "{name}");
+        assert!(
+            number(&found, "/optics/valid_to_deg") > valid_to_deg,
+            "{name}"
+        );
+    }
+}
+
+/// The detections of a photograph of the whole sky, with places that are those of no sky.
+#[test]
+fn skies_that_are_none_are_not_identified() {
+    let Some(shared) = shared_dir() else {
+        return;
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let frame = shared.join("frames/hard/allsky-toscano.jpg");
+    let seen = report(&Ran::new(
+        starpipe().args(["process", "--format=json"]).arg(frame),
+    ));
+    let (width, height) = (number(&seen, "/width"), number(&seen, "/height"));
+    let stars = seen["stars"].as_array().unwrap().iter();
+    let stars = stars.filter_map(|star| {
+        Some((
+            star["x"].as_f64()?,
+            star["y"].as_f64()?,
+            star["flux"].as_f64()?,
+        ))
+    });
+    let stars: Vec<(f64, f64, f64)> = stars.filter(|(.., flux)| *flux > 0.0).collect();
+    let (cx, cy) = (0.5 * width, 0.5 * height);
+    let twisted = |&(x, y, flux): &(f64, f64, f64)| {
+        let (sin, cos) = (3.0 * (x - cx).hypot(y - cy) / width).sin_cos();
+        (
+            cx + (x - cx) * cos - (y - cy) * sin,
+            cy + (x - cx) * sin + (y - cy) * cos,
+            flux,
+        )
+    };
+    let squeezed = |&(x, y, flux): &(f64, f64, f64)| (cx + 0.7 * (x - cx), y, flux);
+    let shuffled = |(index, &(_, y, flux)): (usize, &(f64, f64, f64))| {
+        (stars[(index * 617 + 89) % stars.len()].0, y, flux)
+    };
+    let wrong: [(&str, Vec<(f64, f64, f64)>); 3] = [
+        ("twisted", stars.iter().map(twisted).collect()),
+        ("squeezed", stars.iter().map(squeezed).collect()),
+        ("shuffled", stars.iter().enumerate().map(shuffled).collect()),
+    ];
+    for (name, stars) in wrong {
+        let list = directory.path().join(format!("{name}.csv"));
+        let rows = stars.iter().map(|(x, y, flux)| format!("{x},{y},{flux}\n"));
+        std::fs::write(&list, format!("x,y,flux\n{}", rows.collect::<String>())).unwrap();
+        let size = [format!("--width={width}"), format!("--height={height}")];
+        let ran = Ran::new(
+            starpipe()
+                .args(["identify", "--format=json"])
+                .args(size)
+                .arg(list),
+        );
+        assert_eq!(report(&ran)["status"], "not_identified", "{name}");
+    }
+}
