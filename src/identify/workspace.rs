@@ -85,9 +85,7 @@ pub struct Workspace {
     name_odds: f64,
     effort: Effort,
     buffers: SearchBuffers,
-    thinning: Thinning,
-    tiers: Tiers,
-    windows: Windows,
+    others: Others,
     bright: Brightest,
     answer: Option<Identification>,
 }
@@ -105,9 +103,7 @@ impl Workspace {
             name_odds: NAME_ODDS,
             effort: Effort::Normal,
             buffers: SearchBuffers::default(),
-            thinning: Thinning::default(),
-            tiers: Tiers::default(),
-            windows: Windows::default(),
+            others: Others::default(),
             bright: Brightest::default(),
             answer: None,
         }
@@ -197,9 +193,7 @@ impl Workspace {
             name_odds,
             effort,
             buffers,
-            thinning,
-            tiers,
-            windows,
+            others,
             bright,
             answer,
         } = self;
@@ -212,39 +206,7 @@ impl Workspace {
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none() {
-            let of = |field| Problem { field, ..whole };
-            let coarse = coarser.into_iter().flat_map(|coarser| {
-                let fields = (0..coarser.count()).filter_map(|number| coarser.field(number));
-                fields.map(|field| Choice::new(of(field), SearchPlan::coarse(*effort)))
-            });
-            let of_whole = coarser.map(|_| Choice::new(whole, SearchPlan::votes(*effort)));
-            let windows = windows.of(field).iter().map(|window| {
-                let plan = if window.is_central {
-                    SearchPlan::coarse(*effort)
-                } else {
-                    SearchPlan::window(*effort)
-                };
-                Choice {
-                    window: Some(window),
-                    ..Choice::new(of(&window.field), plan)
-                }
-            });
-            let thinned = thinning.thin(field);
-            let other_stars = SearchPlan::other_stars(*effort);
-            let thinned = thinned.map(|field| Choice::new(of(field), other_stars));
-            let tiers = tiers.below(field, effort.tiers()).iter().map(|tier| {
-                let problem = Problem {
-                    brighter: tier.brighter,
-                    ..of(&tier.field)
-                };
-                Choice::new(problem, SearchPlan::tier(*effort))
-            });
-            let choices = coarse
-                .chain(of_whole)
-                .chain(thinned)
-                .chain(windows)
-                .chain(tiers);
-            for choice in choices {
+            for choice in others.choices(whole, coarser, *effort) {
                 (search, found) = choice.search(search, whole, priors);
                 let log10 = search.best_log10_false_alarm();
                 best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
@@ -272,6 +234,61 @@ impl Workspace {
             bright,
             answer,
         })
+    }
+}
+
+/// What is searched besides the brightest stars of a field. Its buffers are reused.
+#[derive(Debug, Default)]
+struct Others {
+    thinning: Thinning,
+    tiers: Tiers,
+    windows: Windows,
+}
+
+impl Others {
+    /// The frame at lower resolutions, deeper searches of it, parts of it, and fainter stars.
+    fn choices<'w: 'a, 'a>(
+        &'w mut self,
+        whole: Problem<'a>,
+        coarser: Option<&'a dyn CoarserFields>,
+        effort: Effort,
+    ) -> impl Iterator<Item = Choice<'a>> {
+        let of = move |field| Problem { field, ..whole };
+        let coarse = coarser.into_iter().flat_map(move |coarser| {
+            let fields = (0..coarser.count()).filter_map(move |number| coarser.field(number));
+            fields.map(move |field| Choice::new(of(field), SearchPlan::coarse(effort)))
+        });
+        let of_whole = coarser.map(move |_| Choice::new(whole, SearchPlan::votes(effort)));
+        let windows = self.windows.of(whole.field).iter().map(move |window| {
+            let plan = if window.is_central {
+                SearchPlan::coarse(effort)
+            } else {
+                SearchPlan::window(effort)
+            };
+            Choice {
+                window: Some(window),
+                ..Choice::new(of(&window.field), plan)
+            }
+        });
+        let thinned = self.thinning.thin(whole.field);
+        let other_stars = SearchPlan::other_stars(effort);
+        let thinned = thinned.map(move |field| Choice::new(of(field), other_stars));
+        let tiers = self
+            .tiers
+            .below(whole.field, effort.tiers())
+            .iter()
+            .map(move |tier| {
+                let problem = Problem {
+                    brighter: tier.brighter,
+                    ..of(&tier.field)
+                };
+                Choice::new(problem, SearchPlan::tier(effort))
+            });
+        coarse
+            .chain(of_whole)
+            .chain(thinned)
+            .chain(windows)
+            .chain(tiers)
     }
 }
 

@@ -201,6 +201,10 @@ pub(super) fn boresight_of(camera: &CameraModel) -> &'static str {
 fn optics(identification: &Identification) -> OpticsReport {
     let camera = &identification.camera;
     let axis = camera.axis();
+    let corners = camera.corners();
+    let sees_all = corners
+        .iter()
+        .all(|corner| camera.direction_of(corner).is_some());
     let degrees = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 6);
     OpticsReport {
         fov_x_deg: camera.fov_x_rad().map(degrees),
@@ -210,7 +214,7 @@ fn optics(identification: &Identification) -> OpticsReport {
         focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
         mirrored: camera.mirrored,
         axis_px: [axis.x, axis.y].map(|along| to_decimals(along, PIXEL_DECIMALS)),
-        valid_to_deg: (!camera.is_pinhole()).then(|| degrees(camera.max_angle_rad())),
+        valid_to_deg: (!sees_all).then(|| degrees(camera.max_angle_rad())),
         distortion: distortion(camera),
     }
 }

@@ -32,49 +32,73 @@ fn simulated(out: &Path, projection: &str, more: &[&str]) -> Value {
     report(&ran)
 }
 
+/// All-sky cameras and where they look: the projection, and the rest.
+const CAMERAS: [(&str, &[&str]); 3] = [
+    (
+        "equidistant",
+        &[
+            "--focal-length-mm=1.2",
+            "--axis-x-px=14",
+            "--axis-y-px=-9",
+            "--distortion-px=-12",
+            "--ra=310",
+            "--dec=40",
+            "--roll=25",
+        ],
+    ),
+    (
+        "stereographic",
+        &[
+            "--focal-length-mm=0.9",
+            "--ra=80",
+            "--dec=-35",
+            "--roll=-120",
+            "--mirrored",
+        ],
+    ),
+    (
+        "equisolid",
+        &[
+            "--focal-length-mm=1.25",
+            "--decentring-x-px=2",
+            "--ra=190",
+            "--dec=55",
+            "--roll=70",
+        ],
+    ),
+];
+
+/// Asserts that what was found is what was simulated, within five standard errors.
+fn assert_found(found: &Value, made: &Value) {
+    const SIGMAS: f64 = 5.0;
+    let (attitude, optics) = (&found["attitude"], &found["optics"]);
+    assert_eq!(attitude["at"], "axis");
+    assert_ne!(optics["model"], "pinhole");
+    assert_eq!(optics["mirrored"], made["mirrored"]);
+    assert!(optics["fov_y_deg"].is_null() && made["fov_x_deg"].is_null());
+    let valid_to_deg = number(found, "/optics/valid_to_deg");
+    assert!((70.0..91.5).contains(&valid_to_deg), "{valid_to_deg}");
+    let truth = Truth {
+        ra_deg: number(made, "/attitude/ra_deg"),
+        dec_deg: number(made, "/attitude/dec_deg"),
+        fov_x_deg: f64::NAN,
+    };
+    let sigma = |axis: &str| number(found, &format!("/attitude/sigma_arcsec/{axis}"));
+    let off_arcsec = truth.centre_error_deg(found) * 3600.0;
+    let limit_arcsec = SIGMAS * sigma("x").hypot(sigma("y"));
+    assert!(off_arcsec < limit_arcsec, "{off_arcsec} {limit_arcsec}");
+    let focal_px = number(found, "/optics/focal_length_px") - number(made, "/focal_length_px");
+    let sigma_px = number(found, "/optics/focal_length_sigma_px");
+    assert!(focal_px.abs() < SIGMAS * sigma_px, "{focal_px} {sigma_px}");
+}
+
 #[test]
 fn frames_of_the_whole_sky_are_identified_with_nothing_given() {
-    /// Tolerance of the attitude and the focal length, in standard errors.
-    const SIGMAS: f64 = 5.0;
     let directory = tempfile::tempdir().unwrap();
-    let frames: [(&str, &[&str]); 3] = [
-        (
-            "equidistant",
-            &[
-                "--focal-length-mm=1.2",
-                "--axis-x-px=14",
-                "--axis-y-px=-9",
-                "--distortion-px=-12",
-                "--ra=310",
-                "--dec=40",
-                "--roll=25",
-            ],
-        ),
-        (
-            "stereographic",
-            &[
-                "--focal-length-mm=0.9",
-                "--ra=80",
-                "--dec=-35",
-                "--roll=-120",
-                "--mirrored",
-            ],
-        ),
-        (
-            "equisolid",
-            &[
-                "--focal-length-mm=1.25",
-                "--decentring-x-px=2",
-                "--ra=190",
-                "--dec=55",
-                "--roll=70",
-            ],
-        ),
-    ];
-    for (projection, more) in frames {
+    let out = directory.path().join("out");
+    for (projection, more) in CAMERAS {
         let frame = directory.path().join(format!("{projection}.tif"));
         let made = simulated(&frame, projection, more);
-        let out = directory.path().join("out");
         let ran = Ran::new(
             starpipe()
                 .args(["process", "--format=json", "--out"])
@@ -86,38 +110,7 @@ fn frames_of_the_whole_sky_are_identified_with_nothing_given() {
             "{projection}: {}",
             found["reason"]
         );
-        let (attitude, optics) = (&found["attitude"], &found["optics"]);
-        assert_eq!(attitude["at"], "axis");
-        assert_ne!(optics["model"], "pinhole");
-        assert_eq!(optics["mirrored"], made["mirrored"]);
-        assert_eq!(
-            (&optics["fov_y_deg"], &made["fov_x_deg"]),
-            (&Value::Null, &Value::Null)
-        );
-        let valid_to_deg = number(&found, "/optics/valid_to_deg");
-        assert!(
-            (70.0..91.5).contains(&valid_to_deg),
-            "{projection}: {valid_to_deg}"
-        );
-        let truth = Truth {
-            ra_deg: number(&made, "/attitude/ra_deg"),
-            dec_deg: number(&made, "/attitude/dec_deg"),
-            fov_x_deg: f64::NAN,
-        };
-        let sigma = |axis: &str| number(&found, &format!("/attitude/sigma_arcsec/{axis}"));
-        let off_arcsec = truth.centre_error_deg(&found) * 3600.0;
-        let limit_arcsec = SIGMAS * sigma("x").hypot(sigma("y"));
-        assert!(
-            off_arcsec < limit_arcsec,
-            "{projection}: {off_arcsec} {limit_arcsec}"
-        );
-        let focal_px =
-            number(&found, "/optics/focal_length_px") - number(&made, "/focal_length_px");
-        let sigma_px = number(&found, "/optics/focal_length_sigma_px");
-        assert!(
-            focal_px.abs() < SIGMAS * sigma_px,
-            "{projection}: {focal_px} {sigma_px}"
-        );
+        assert_found(&found, &made);
         let header = std::fs::read(out.join(format!("{projection}.wcs"))).unwrap();
         assert!(
             header
@@ -152,6 +145,9 @@ fn photographs_of_the_whole_sky_are_identified_with_nothing_given() {
     }
 }
 
+/// Place and flux of a detection.
+type Row = (f64, f64, f64);
+
 /// The detections of a photograph of the whole sky, with places that are those of no sky.
 #[test]
 fn skies_that_are_none_are_not_identified() {
@@ -172,9 +168,9 @@ fn skies_that_are_none_are_not_identified() {
             star["flux"].as_f64()?,
         ))
     });
-    let stars: Vec<(f64, f64, f64)> = stars.filter(|(.., flux)| *flux > 0.0).collect();
+    let stars: Vec<Row> = stars.filter(|(.., flux)| *flux > 0.0).collect();
     let (cx, cy) = (0.5 * width, 0.5 * height);
-    let twisted = |&(x, y, flux): &(f64, f64, f64)| {
+    let twisted = |&(x, y, flux): &Row| {
         let (sin, cos) = (3.0 * (x - cx).hypot(y - cy) / width).sin_cos();
         (
             cx + (x - cx) * cos - (y - cy) * sin,
@@ -182,11 +178,11 @@ fn skies_that_are_none_are_not_identified() {
             flux,
         )
     };
-    let squeezed = |&(x, y, flux): &(f64, f64, f64)| (cx + 0.7 * (x - cx), y, flux);
-    let shuffled = |(index, &(_, y, flux)): (usize, &(f64, f64, f64))| {
+    let squeezed = |&(x, y, flux): &Row| (cx + 0.7 * (x - cx), y, flux);
+    let shuffled = |(index, &(_, y, flux)): (usize, &Row)| {
         (stars[(index * 617 + 89) % stars.len()].0, y, flux)
     };
-    let wrong: [(&str, Vec<(f64, f64, f64)>); 3] = [
+    let wrong: [(&str, Vec<Row>); 3] = [
         ("twisted", stars.iter().map(twisted).collect()),
         ("squeezed", stars.iter().map(squeezed).collect()),
         ("shuffled", stars.iter().enumerate().map(shuffled).collect()),

@@ -286,7 +286,10 @@ impl Refiner {
             current = self.fitted(problem, &guess)?;
             let lens_before = lens;
             // The names are more stars than those that the model was chosen for.
-            if round == 0 || (!settled && self.are_residuals_unexplained(problem, &current)) {
+            let is_open = round == 0
+                || (!settled && self.are_residuals_unexplained(problem, &current))
+                || self.depend_on_place(problem);
+            if is_open {
                 let mut chosen = self.choose_lens(problem, &current, DistortionModel::Irregular5);
                 chosen.model = chosen.model.max(wanted.min_distortion);
                 if chosen != lens {
@@ -295,8 +298,7 @@ impl Refiner {
                     current = self.fitted(problem, &guess)?;
                 }
             }
-            let is_last = round + 1 >= NAMING_ROUNDS && lens == lens_before;
-            if settled || is_last {
+            if lens == lens_before && (settled || round + 1 >= NAMING_ROUNDS) {
                 break;
             }
         }
