@@ -1,12 +1,13 @@
 //! Fits of attitude and camera to stars.
 //!
 //! [`fit_camera`] fits attitude, focal length and lens distortion to star positions in pixels.
-//! `growth` follows a lens from a part of the frame over all of it.
-//! `refine` pairs stars and fits in turn, until a hypothesis has all of its stars.
+//! `lens_choice` chooses the lens that `refine` fits, which pairs stars and fits in turn, until a
+//! hypothesis has all of its stars. `growth` follows a lens from a part of the frame over all of it.
 
 mod adjustment;
 mod camera_fit;
 mod growth;
+mod lens_choice;
 mod predictions;
 mod refine;
 
