@@ -1,8 +1,8 @@
 //! starpipe finds the stars in a photograph of the night sky, names them, determines where the
 //! camera pointed, and says how certain each of these is.
 //!
-//! It is for frames of star sensors and cameras with fields from about 1.5° to the whole sky: lost in space,
-//! with nothing known beforehand, or with priors, or tracked from frame to frame. Around that it
+//! It is for frames of star sensors and cameras with fields from about 1.5° to the whole sky: lost in
+//! space, with nothing known beforehand, or with priors, or tracked from frame to frame. Around that it
 //! predicts what a camera should see, simulates frames, and validates cameras and itself on them. It
 //! is not a tool for galaxies and nebulae, or for spectra.
 //!

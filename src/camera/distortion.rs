@@ -149,15 +149,33 @@ impl Distortion {
         }
     }
 
-    /// The same with a larger coefficient of r³; `more` is in units of R.
-    pub(crate) fn with_more_of_third_order(&self, more: f64) -> Self {
-        let mut coefficients_px = self.coefficients_px;
-        coefficients_px[0] += more * self.radius_px;
+    /// No displacement by any of the terms of `model`.
+    pub(crate) fn zero(model: DistortionModel, radius_px: f64) -> Self {
+        Self::new(model, radius_px, &[0.0; MAX_TERMS][..model.terms()])
+    }
+
+    /// The terms of `model` alone; those that this distortion lacks are 0.
+    pub(crate) fn of_model(&self, model: DistortionModel) -> Self {
         Self::new(
-            self.model,
+            model,
             self.radius_px,
-            &coefficients_px[..self.model.terms()],
+            &self.coefficients_px[..model.terms()],
         )
+    }
+
+    /// The radial terms alone.
+    pub(crate) fn radial(&self) -> Self {
+        self.of_model(DistortionModel::Radial7)
+    }
+
+    /// The same with changes added to the first coefficients, in pixels.
+    pub(crate) fn changed(&self, changes_px: impl IntoIterator<Item = f64>) -> Self {
+        let mut changed = *self;
+        let coefficients = changed.coefficients_px[..self.model.terms()].iter_mut();
+        for (coefficient, change) in coefficients.zip(changes_px) {
+            *coefficient += change;
+        }
+        changed.of_model(self.model)
     }
 
     /// The distortion model.
@@ -224,25 +242,32 @@ impl Distortion {
     #[inline]
     pub fn apply(&self, ideal: [f64; 2]) -> Option<[f64; 2]> {
         let c = self.normalized();
+        let offset = self.before_fold(ideal)?;
+        let (moved, _) = self.irregular(offset);
+        Some(self.placed(&c, distorted(&c, offset), moved))
+    }
+
+    /// An ideal offset in units of R; `None` where the image would fold.
+    #[inline(always)]
+    fn before_fold(&self, ideal: [f64; 2]) -> Option<[f64; 2]> {
         let [u, v] = ideal.map(|along| along / self.radius_px);
-        let r2 = u * u + v * v;
-        if r2 >= self.fold_sq {
-            return None;
-        }
-        let [du, dv] = distorted(&c, [u, v]);
+        (u * u + v * v < self.fold_sq).then_some([u, v])
+    }
+
+    /// The place in pixels of what is distorted to (du, dv) and moved by the monomials.
+    #[inline(always)]
+    fn placed(&self, c: &[f64; LENS_TERMS], [du, dv]: [f64; 2], [mu, mv]: [f64; 2]) -> [f64; 2] {
         let [stretch, skew] = [c[STRETCH], c[STRETCH + 1]];
-        let ([mu, mv], _) = self.irregular([u, v]);
         let along_u = du + stretch * du + skew * dv + c[AXIS] + mu;
         let along_v = dv - stretch * dv + skew * du + c[AXIS + 1] + mv;
-        Some([along_u * self.radius_px, along_v * self.radius_px])
+        [along_u * self.radius_px, along_v * self.radius_px]
     }
 
     /// [`Self::apply`], with the derivatives.
     #[inline]
     pub(crate) fn observe(&self, ideal: [f64; 2]) -> Option<Observed> {
-        let at = self.apply(ideal)?;
         let c = self.normalized();
-        let offset = ideal.map(|along| along / self.radius_px);
+        let offset = self.before_fold(ideal)?;
         let [du, dv] = distorted(&c, offset);
         let [[uu, uv], [vu, vv]] = slope(&c, offset);
         let [stretch, skew] = [c[STRETCH], c[STRETCH + 1]];
@@ -260,9 +285,9 @@ impl Distortion {
         }
         (by_term[0][STRETCH], by_term[1][STRETCH]) = (du, -dv);
         (by_term[0][STRETCH + 1], by_term[1][STRETCH + 1]) = (dv, du);
-        let (_, [of_u, of_v]) = self.irregular(offset);
+        let (moved, [of_u, of_v]) = self.irregular(offset);
         Some(Observed {
-            at,
+            at: self.placed(&c, [du, dv], moved),
             by_ideal: [
                 [by_u_u + of_u[0], by_v_u + of_u[1]],
                 [by_u_v + of_v[0], by_v_v + of_v[1]],

@@ -106,7 +106,8 @@ impl CameraModel {
         if let Some(distortion) = &mut distortion {
             let third = projection.third_order_to(self.projection);
             let radius = distortion.radius_px() / self.focal_length_px;
-            *distortion = distortion.with_more_of_third_order(third * radius.powi(2));
+            let more = third * radius.powi(2);
+            *distortion = distortion.changed([more * distortion.radius_px()]);
         }
         let other = self.with_projection(projection).with_distortion(distortion);
         let is_limited = self.max_angle_rad < self.projection.max_angle_rad();

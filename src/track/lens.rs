@@ -7,7 +7,7 @@
 //! changes with its temperature.
 
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::camera::{CameraModel, Distortion, DistortionModel, MAX_TERMS};
+use crate::camera::{CameraModel, DistortionModel};
 use crate::identify::fit::{MeasuredStar, Prediction, Predictor};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
@@ -90,7 +90,7 @@ impl LensRefiner {
 
     /// Adds the two equations of a star.
     fn add_star(&mut self, star: &MeasuredStar, predictor: &Predictor, excess_px: f64) {
-        let Some(prediction) = predictor.predict(star) else {
+        let Some(prediction) = predictor.predict(&star.icrs) else {
             return;
         };
         let Prediction {
@@ -146,16 +146,8 @@ impl LensRefiner {
         root.solve_mut(&mut self.step);
         if self.step[0].abs() < MAX_STEP && self.step.iter().all(|step| step.is_finite()) {
             let focal_length_px = self.camera.focal_length_px() * self.step[0].exp();
-            let distortion = self.camera.distortion().map(|distortion| {
-                let mut coefficients_px = [0.0; MAX_TERMS];
-                let known = distortion.coefficients_px();
-                let steps = self.step.iter().skip(1);
-                for ((new, old), step) in coefficients_px.iter_mut().zip(known).zip(steps) {
-                    *new = old + step;
-                }
-                let coefficients_px = &coefficients_px[..known.len()];
-                Distortion::new(distortion.model(), distortion.radius_px(), coefficients_px)
-            });
+            let steps = || self.step.iter().skip(1).copied();
+            let distortion = self.camera.distortion().map(|known| known.changed(steps()));
             let camera = self.camera.with_focal_length(focal_length_px);
             self.camera = camera.with_distortion(distortion);
         }
@@ -172,6 +164,7 @@ impl LensRefiner {
 mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
+    use crate::camera::Distortion;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

@@ -23,6 +23,16 @@ pub struct MeasuredStar {
     pub sigma_px: f64,
 }
 
+/// The standard error of an outlier (with an unresolved companion, for example) as it counts in a fit:
+/// it grows with the residual, so that it pulls no harder than other stars (Huber 1964, Ann. Math. Stat.
+/// 35, 73).
+pub(super) fn robust_sigma_px(sigma_px: f64, residual_px: f64) -> f64 {
+    /// Residual in standard errors beyond which a star pulls no harder.
+    const HUBER_SIGMAS: f64 = 2.5;
+    let excess = residual_px / (HUBER_SIGMAS * sigma_px);
+    sigma_px * excess.max(1.0).sqrt()
+}
+
 /// Parameters without distortion: rotation about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
 /// Parameters with all terms of a lens.
@@ -168,49 +178,37 @@ impl Predictor {
         icrs_to_camera: &Rotation<Icrs, Camera>,
         model: Option<DistortionModel>,
     ) -> Self {
-        let mut coefficients_px = [0.0; MAX_TERMS];
-        let terms = model.map_or(0, DistortionModel::terms);
-        if let Some(distortion) = camera.distortion() {
-            let known = distortion.coefficients_px().iter().take(terms);
-            let all = coefficients_px.iter_mut().zip(known);
-            all.for_each(|(new, old)| *new = *old);
-        }
+        let zero = Distortion::zero(DistortionModel::Irregular5, camera.radius_px());
+        let of_model = |distortion: &Distortion| model.map(|model| distortion.of_model(model));
+        let known = camera.distortion().and_then(of_model);
         let mut predictor = Self {
             camera: *camera,
             icrs_to_lens: *icrs_to_camera,
-            distortion: Distortion::new(
-                DistortionModel::Irregular5,
-                camera.radius_px(),
-                &coefficients_px,
-            ),
+            distortion: known.map_or(zero, |known| known.of_model(DistortionModel::Irregular5)),
         };
-        predictor.set_lens(camera.focal_length_px(), &coefficients_px, model);
+        predictor.set_lens(camera.focal_length_px(), predictor.distortion, model);
         let to_lens = predictor.camera.lens_axes();
         predictor.icrs_to_lens = Rotation::from_matrix(to_lens * icrs_to_camera.matrix());
         predictor
     }
 
-    /// Sets the lens, and leaves its axes.
+    /// Sets the lens, with the terms of `model` alone, and leaves its axes.
     fn set_lens(
         &mut self,
         focal_length_px: f64,
-        coefficients_px: &[f64; MAX_TERMS],
+        distortion: Distortion,
         model: Option<DistortionModel>,
     ) {
-        let radius_px = self.distortion.radius_px();
-        let [all, of_model] = [Some(DistortionModel::Irregular5), model].map(|model| {
-            model.map(|m| Distortion::new(m, radius_px, &coefficients_px[..m.terms()]))
-        });
-        self.distortion = all.unwrap_or(self.distortion);
+        self.distortion = distortion;
         let camera = self.camera.with_focal_length(focal_length_px);
-        self.camera = camera.with_distortion(of_model);
+        self.camera = camera.with_distortion(model.map(|model| distortion.of_model(model)));
     }
 
     /// `None` if the star is not imaged.
     #[inline(always)]
-    pub fn predict(&self, star: &MeasuredStar) -> Option<Prediction> {
+    pub fn predict(&self, icrs: &UnitVector<Icrs>) -> Option<Prediction> {
         let f = self.camera.focal_length_px();
-        let direction = self.icrs_to_lens.apply(&star.icrs);
+        let direction = self.icrs_to_lens.apply(icrs);
         let projected = self.camera.projection().project(&direction)?;
         let ideal = projected.at.map(|along| along * f);
         let observed = self.distortion.observe(ideal)?;
@@ -279,7 +277,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         } = &self.predictor;
         let known = distortion.coefficients_px();
         for (lane, star) in stars.iter().enumerate().take(LANES) {
-            let prediction = self.predictor.predict(star)?;
+            let prediction = self.predictor.predict(&star.icrs)?;
             let Prediction {
                 by_pose, observed, ..
             } = &prediction;
@@ -408,13 +406,11 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         let turn = Vector3::new(change[0], change[1], change[2]) * share;
         predictor.icrs_to_lens = predictor.icrs_to_lens.then_turn(turn);
         let focal_length_px = predictor.camera.focal_length_px() * (share * change[3]).exp();
-        let mut coefficients_px = [0.0; MAX_TERMS];
-        let known = predictor.distortion.coefficients_px();
         let changes = change.iter().skip(POSE_PARAMETERS);
-        for ((new, known), change) in coefficients_px.iter_mut().zip(known).zip(changes) {
-            *new = known + share * change;
-        }
-        predictor.set_lens(focal_length_px, &coefficients_px, self.model);
+        let distortion = predictor
+            .distortion
+            .changed(changes.map(|change| share * change));
+        predictor.set_lens(focal_length_px, distortion, self.model);
     }
 
     /// Observed minus predicted position of [`LANES`] stars or fewer. `None` if one is not imaged.
@@ -422,7 +418,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
     pub fn residuals_px(&self, stars: &[MeasuredStar]) -> Option<[Lanes; 2]> {
         let mut residuals_px = [[0.0; LANES]; 2];
         for (lane, star) in stars.iter().enumerate().take(LANES) {
-            let predicted = self.predictor.predict(star)?.observed.at;
+            let predicted = self.predictor.predict(&star.icrs)?.observed.at;
             let offset = self.predictor.camera.offset_of(&star.pixel);
             for axis in 0..2 {
                 residuals_px[axis][lane] = offset[axis] - predicted[axis];

@@ -5,7 +5,7 @@
 
 use super::adjustment::{Adjustment, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::camera::{CameraModel, Distortion, DistortionModel, MAX_TERMS};
+use crate::camera::{CameraModel, Distortion, DistortionModel};
 use nalgebra::{Matrix4, SMatrix, Vector4};
 
 /// Result of the fit.
@@ -155,16 +155,8 @@ fn with_step(
     let Some(term) = parameter.checked_sub(POSE_PARAMETERS) else {
         return camera.with_focal_length(camera.focal_length_px() * step.exp());
     };
-    let mut coefficients_px = [0.0; MAX_TERMS];
-    let known = distortion.coefficients_px();
-    coefficients_px[..known.len()].copy_from_slice(known);
-    coefficients_px[term] += step;
-    let (model, radius_px) = (distortion.model(), distortion.radius_px());
-    camera.with_distortion(Some(Distortion::new(
-        model,
-        radius_px,
-        &coefficients_px[..known.len()],
-    )))
+    let changes = std::iter::repeat_n(0.0, term).chain([step]);
+    camera.with_distortion(Some(distortion.changed(changes)))
 }
 
 #[cfg(test)]

@@ -7,7 +7,9 @@
 //! that are predicted so well that chance seldom puts a detection there are paired. Each fit brings
 //! more of them into reach.
 
-use super::adjustment::{Adjustment, LANES, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor};
+use super::adjustment::{
+    Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor, robust_sigma_px,
+};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::neighbors::PointGrid;
 use crate::base::statistics::{log10_binomial_tail, median};
@@ -15,6 +17,7 @@ use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, DistortionModel, Projection};
 use crate::identify::field::Photometry;
 use crate::identify::hypothesis::{Hypothesis, Problem};
+use crate::identify::identification::MIN_STARS;
 use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings};
 use nalgebra::{Matrix3, SMatrix, SVector};
 use std::f64::consts::PI;
@@ -35,8 +38,6 @@ const MIN_RADIUS_PX: f64 = 1.5;
 const MAX_RADIUS_SHARE: f64 = 0.005;
 /// Smallest error of a star's place, in pixels, while the lens is not known well.
 const MIN_SIGMA_PX: f64 = 0.3;
-/// Residual in standard errors beyond which a star pulls no harder.
-const HUBER_SIGMAS: f64 = 2.5;
 /// Maximum rounds of pairing and fitting.
 const MAX_ROUNDS: usize = 40;
 /// A fit ends where a step moves the predicted places by less than this, in standard errors.
@@ -143,13 +144,8 @@ impl Growth {
         self.differences_mag.clear();
         for star in self.predicted.iter().take(MAX_PREDICTED) {
             let direction = fitted.icrs_to_camera.apply(&star.direction);
-            let wanted = MeasuredStar {
-                pixel: star.pixel,
-                icrs: star.direction,
-                sigma_px: 1.0,
-            };
             let Some(sigma_px) = predictor
-                .predict(&wanted)
+                .predict(&star.direction)
                 .map(|prediction| fitted.sigma_px(&prediction))
             else {
                 continue;
@@ -168,11 +164,10 @@ impl Growth {
             if let Some((index, distance_px)) = found {
                 let observed = &field.stars[index];
                 let sigma_px = observed.sigma_px.hypot(MIN_SIGMA_PX);
-                let excess = distance_px / (HUBER_SIGMAS * sigma_px);
                 self.stars.push(MeasuredStar {
                     pixel: observed.position,
                     icrs: star.direction,
-                    sigma_px: sigma_px * excess.max(1.0).sqrt(),
+                    sigma_px: robust_sigma_px(sigma_px, distance_px),
                 });
                 self.differences_mag
                     .push(f64::from(star.v_mag) - observed.mag);
@@ -288,7 +283,7 @@ fn fit(
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> Option<Fitted> {
-    if stars.len() < LANES / 2 {
+    if stars.len() < MIN_STARS {
         return None;
     }
     let mut adjustment = Adjustment::<PARAMETERS>::new(stars, camera, icrs_to_camera, Some(MODEL));

@@ -3,6 +3,7 @@
 //! pairing → fit → pairing within a smaller radius → … with as much lens distortion as the stars
 //! support
 
+use super::adjustment::robust_sigma_px;
 use super::lens_choice::{Lens, LensChoice, depend_on_place, is_affordable, with_projection};
 use super::{CameraFit, MeasuredStar, fit_camera};
 use crate::base::coords::{Camera, Icrs, Rotation};
@@ -28,8 +29,6 @@ const EXCESS_SIGMAS: f64 = 2.0;
 const MEDIAN_ERROR: f64 = 1.0 / std::f64::consts::LN_2;
 /// Bisections for the excess error, down to a ten-thousandth of the largest residual.
 const EXCESS_BISECTIONS: usize = 14;
-/// Residual in standard errors beyond which a star pulls no harder.
-const HUBER_SIGMAS: f64 = 2.5;
 /// Rounds of naming and fitting after which only a new distortion model is a reason for another.
 const NAMING_ROUNDS: usize = 3;
 /// Maximum rounds of naming and fitting.
@@ -360,18 +359,15 @@ impl Refiner {
         }
     }
 
-    /// Converts the pairs to the input of the fit. The error of an outlier (with an unresolved
-    /// companion, for example) grows with its residual, so that it pulls no harder than other stars
-    /// (Huber 1964, Ann. Math. Stat. 35, 73).
+    /// Converts the pairs to the input of the fit.
     fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
             let star = &problem.field.stars[pair.observed];
             let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
-            let excess = pair.residual_px / (HUBER_SIGMAS * sigma_px);
             MeasuredStar {
                 pixel: star.position,
                 icrs: pair.direction,
-                sigma_px: sigma_px * excess.max(1.0).sqrt(),
+                sigma_px: robust_sigma_px(sigma_px, pair.residual_px),
             }
         };
         self.stars.clear();

@@ -108,7 +108,7 @@ fn field_line(solution: &Solution) -> String {
 }
 
 /// The angles that a camera sees.
-pub(crate) fn field_text(camera: &CameraModel) -> String {
+fn field_text(camera: &CameraModel) -> String {
     match camera.fov_x_rad().zip(camera.fov_y_rad()) {
         Some((x_rad, y_rad)) => {
             format!("{:.2}° × {:.2}°", x_rad * DEG_PER_RAD, y_rad * DEG_PER_RAD)

@@ -1,7 +1,7 @@
 //! The planes that pixels are mapped to: gnomonic, or the polynomial of the angle.
 
 use crate::base::coords::{Camera, UnitVector};
-use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
+use crate::camera::{CameraModel, Distortion, Projection};
 use crate::frame::FitsHeader;
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -75,19 +75,8 @@ impl Plane {
 
 /// The polynomial of the angle that is the camera's radial distance from its axis.
 fn radial_powers(camera: &CameraModel) -> [f64; POWERS] {
-    let radial = camera.distortion().map(|distortion| {
-        let radius_px = distortion.radius_px();
-        let coefficients_px = distortion.coefficients_px();
-        let terms = coefficients_px.len().min(DistortionModel::Radial7.terms());
-        let of_radial = [0, 1, 2].map(|term| {
-            if term < terms {
-                coefficients_px[term]
-            } else {
-                0.0
-            }
-        });
-        Distortion::new(DistortionModel::Radial7, radius_px, &of_radial)
-    });
+    let distortion = camera.distortion();
+    let radial = distortion.map(Distortion::radial);
     let round = camera.with_distortion(radial);
     let max_rad = camera.radius_rad();
     let seen = (1..=FIT_ANGLES).filter_map(|i| {
