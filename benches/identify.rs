@@ -11,6 +11,7 @@ use starpipe::identify::{self, IndexedCatalog, Priors, ScalePrior, StarField, id
 use starpipe::pipeline::{Context, Workspace, solve_frame, star_field};
 use starpipe::sky::catalog::Catalog;
 use starpipe::sky::catalog::sky_grid::SkyGrid;
+use starpipe::sky::places::StarPlaces;
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;
@@ -25,7 +26,7 @@ fn prepare(path: &Path, indexed: &IndexedCatalog) -> Option<(Frame<'static>, Sta
         &mut detect::Workspace::new(),
     )
     .ok()?;
-    let field = star_field(&frame, &detections, 0.0);
+    let field = star_field(&frame, &detections, StarPlaces::default());
     let identification = identify(&field, &Priors::default(), indexed).ok()?;
     let scale_rad = 1.0 / identification.camera.focal_length_px();
     let priors = Priors {

@@ -12,6 +12,7 @@ use starpipe::camera::data_sheet::Preset;
 use starpipe::model::sensitivity::{Budget, Detector, Rule, Scenario};
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use std::hint::black_box;
 
 fn prediction(criterion: &mut Criterion) {
@@ -33,7 +34,7 @@ fn simulation(criterion: &mut Criterion) {
     let boresight = UnitVector::from_ra_dec(296.8f64.to_radians(), 41.4f64.to_radians());
     let pointing = Pointing {
         icrs_to_camera: Rotation::looking_at(&boresight, 0.0),
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
     };
     let stars = Catalog::built_in().stars();
     let simulator = Simulator::new(&scenario, &Scene::default(), stars).unwrap();

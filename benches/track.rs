@@ -11,6 +11,7 @@ use starpipe::identify::IndexedCatalog;
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::pipeline::Context;
+use starpipe::sky::places::StarPlaces;
 use starpipe::track::{Mode, Tracker};
 use std::hint::black_box;
 
@@ -50,7 +51,7 @@ fn sequence(swing_deg: f64, count: u32, indexed: &IndexedCatalog) -> Vec<Frame<'
         let turn = -axis * (swing_deg * phase.sin()).to_radians();
         let pointing = Pointing {
             icrs_to_camera: start.then_turn(turn),
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
         };
         let made = simulator.and_then(|simulator| simulator.frame(&pointing, u64::from(number)));
         made.expect("a valid camera").0

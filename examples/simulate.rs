@@ -10,6 +10,7 @@ use starpipe::camera::data_sheet::Preset;
 use starpipe::frame::{FitsHeader, FitsSamples, TiffOptions, TiffSamples, write_fits, write_tiff};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::sky::places::StarPlaces;
 use starpipe::{Catalog, Rotation, UnitVector};
 use std::error::Error;
 use std::fs::File;
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pointing = Pointing {
         icrs_to_camera: Rotation::looking_at(&boresight, 0.0),
         // J2000.0, which the programs take for frames without a date.
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
     };
     let (frame, truth) = simulator.frame(&pointing, SEED)?;
 

@@ -10,6 +10,7 @@ use starpipe::frame::{self, FrameError};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Setup, Simulator};
 use starpipe::nalgebra::Vector3;
+use starpipe::sky::places::StarPlaces;
 use starpipe::{Catalog, Context, Frame, IndexedCatalog, Rotation, Track, Tracker, UnitVector};
 use std::error::Error;
 
@@ -74,7 +75,7 @@ fn simulated_frames() -> Result<impl Iterator<Item = ReadFrame>, Box<dyn Error>>
         let turn_rad = Vector3::from(RATE_DEG_S).map(f64::to_radians) * turned_s;
         let pointing = Pointing {
             icrs_to_camera: first.then_turn(-turn_rad),
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
         };
         simulator
             .frame(&pointing, u64::from(number))

@@ -9,6 +9,7 @@ use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Identification, IndexedCatalog, Priors, ScalePrior};
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -60,7 +61,7 @@ impl Bench<'_> {
         let priors = self.priors(is_known);
         let start = Instant::now();
         let detections = if is_fresh { &self.found } else { &self.known };
-        let field = star_field(&self.frame, detections, 0.0);
+        let field = star_field(&self.frame, detections, StarPlaces::default());
         let answer = self.identify.identify(&field, &priors, &self.indexed);
         (milliseconds(start), answer.ok())
     }
@@ -68,7 +69,7 @@ impl Bench<'_> {
     /// Attitude from the brightest stars, of as many as the other programs are given.
     fn brightest(&mut self, is_known: bool) -> (f64, Option<Identification>) {
         let priors = self.priors(is_known);
-        let mut field = star_field(&self.frame, &self.known, 0.0);
+        let mut field = star_field(&self.frame, &self.known, StarPlaces::default());
         field.stars.truncate(MAX);
         let start = Instant::now();
         let found = self.identify.attitude(&field, &priors, &self.indexed);
@@ -78,7 +79,7 @@ impl Bench<'_> {
     /// Time of naming all stars of the loaded frame, after pointing.
     fn naming(&mut self, is_known: bool) -> (f64, Option<Identification>) {
         let priors = self.priors(is_known);
-        let field = star_field(&self.frame, &self.known, 0.0);
+        let field = star_field(&self.frame, &self.known, StarPlaces::default());
         let pointing = self.identify.find_pointing(&field, &priors, &self.indexed);
         let start = Instant::now();
         let found = pointing.and_then(identify::Pointing::name_stars);
@@ -106,7 +107,7 @@ impl Bench<'_> {
                 Ok(to_json(naming_ms, found.as_ref()))
             }
             "stars" => {
-                let field = star_field(&self.frame, &self.known, 0.0);
+                let field = star_field(&self.frame, &self.known, StarPlaces::default());
                 let stars = field.brightest(MAX).iter();
                 let stars = stars.map(|s| [s.position.x, s.position.y, 10f64.powf(-0.4 * s.mag)]);
                 Ok(json!({"stars": stars.collect::<Vec<_>>()}))

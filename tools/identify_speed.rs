@@ -14,6 +14,7 @@ use starpipe::identify::{
 };
 use starpipe::pipeline::star_field;
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Answer, Protocol, SimulatedCentroids};
 use std::error::Error;
 use std::f64::consts::SQRT_2;
@@ -108,7 +109,7 @@ fn simulated(fields: u64, indexed: &IndexedCatalog) {
         };
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let drawn = SimulatedCentroids::draw(&protocol, indexed, &mut random);
-        let field = drawn.list.star_field(0.0);
+        let field = drawn.list.star_field(StarPlaces::default());
         for (times, priors) in [
             (&mut nothing, Priors::default()),
             (&mut factor, factor_of_two(&drawn.camera)),
@@ -131,7 +132,7 @@ fn real(frames: &[String], indexed: &IndexedCatalog) -> Result<(), Box<dyn Error
             &DetectConfig::default(),
             &mut detect::Workspace::new(),
         )?;
-        let field = star_field(&frame, &detections, 0.0);
+        let field = star_field(&frame, &detections, StarPlaces::default());
         let mut nothing = Times::new();
         let found = nothing.add(&field, &Priors::default(), indexed);
         println!("{path}: {} stars", field.stars.len());

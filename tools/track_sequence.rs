@@ -21,6 +21,7 @@ use starpipe::identify::fit::{MeasuredStar, fit_camera};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::pipeline::Context;
+use starpipe::sky::places::StarPlaces;
 use starpipe::track::{Mode, Track, Tracker};
 use std::error::Error;
 use std::time::Instant;
@@ -335,7 +336,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let simulator = Simulator::new(&scenario, &scene, indexed.stars())?;
         let pointing = Pointing {
             icrs_to_camera: truth,
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
         };
         let seed = plan.seed * 1_000_000 + number;
         let frame = if plan.is_dark(number) {

@@ -6,6 +6,8 @@ use pyo3::prelude::*;
 use starpipe::detect::CentroidMethod;
 use starpipe::identify::Effort;
 use starpipe::pipeline::SolveOptions;
+use starpipe::sky::observer::Air;
+use starpipe::sky::places::AttitudeFrame;
 use starpipe::{ObservationDate, Site};
 
 /// The options as Python has checked them; `None` stands for the default.
@@ -19,6 +21,9 @@ pub struct Options {
     radius_deg: f64,
     date: Option<String>,
     site: Option<[f64; 3]>,
+    air: Option<[f64; 2]>,
+    velocity_km_s: Option<[f64; 3]>,
+    frame_of: String,
     exposure_s: Option<f64>,
     zenith_distance_deg: Option<f64>,
     extinction_mag_per_airmass: Option<f64>,
@@ -46,7 +51,11 @@ impl Options {
         options.near_deg = self.near_deg;
         options.radius_deg = self.radius_deg;
         options.date = date.transpose().map_err(exception)?;
-        options.site = site.transpose().map_err(exception)?;
+        let site = site.transpose().map_err(exception)?;
+        let air = self.air.map(|[hpa, celsius]| Air::new(hpa, celsius));
+        options.site = site.map(|site| air.map_or(site, |air| site.with_air(air)));
+        options.velocity_km_s = self.velocity_km_s;
+        options.attitude_frame = attitude_frame(&self.frame_of)?;
         options.exposure_s = self.exposure_s;
         options.zenith_distance_deg = self.zenith_distance_deg;
         options.extinction_mag_per_airmass = self.extinction_mag_per_airmass;
@@ -65,6 +74,16 @@ impl Options {
             options.centroid = centroid_method(centroid)?;
         }
         Ok(options)
+    }
+}
+
+fn attitude_frame(name: &str) -> PyResult<AttitudeFrame> {
+    match name {
+        "icrs" => Ok(AttitudeFrame::Icrs),
+        "apparent" => Ok(AttitudeFrame::Apparent),
+        other => Err(PyValueError::new_err(format!(
+            "frame_of must be 'icrs' or 'apparent', not '{other}'"
+        ))),
     }
 }
 

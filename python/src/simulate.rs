@@ -9,9 +9,11 @@ use pyo3::prelude::*;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
 use starpipe::base::units::RAD_PER_DEG;
 use starpipe::frame::{FitsHeader, RowOrder};
+use starpipe::identify::SkyView;
 use starpipe::model::sensitivity::{Budget, Detector, Rule};
 use starpipe::model::simulate::{Pointing, Simulator, truth_table};
 use starpipe::report::wcs;
+use starpipe::sky::places::StarPlaces;
 use starpipe::study::validation::draw;
 use starpipe::{ObservationDate, UnitVector};
 use std::num::NonZeroUsize;
@@ -73,15 +75,23 @@ pub fn simulate(
                 return Ok((frame.map_err(exception)?, None));
             }
         };
+        let places = date.map_or_else(StarPlaces::default, |date| {
+            StarPlaces::at(&date, None, None)
+        });
         let pointing = Pointing {
-            icrs_to_camera: attitude,
-            years_since_j2000: date.map_or(0.0, |date| date.years_since_j2000()),
+            icrs_to_camera: places.apparent_attitude(&attitude),
+            places,
         };
         let (frame, truth) = simulator.frame(&pointing, seed).map_err(exception)?;
         let camera = simulator.camera();
-        let rows = truth_table(&truth, camera, catalog, Some(&attitude));
+        let rows = truth_table(&truth, camera, catalog, Some(&pointing));
         let mut header = FitsHeader::default();
-        wcs::add_projection(&mut header, camera, &attitude, RowOrder::TopDown);
+        let view = SkyView {
+            camera,
+            icrs_to_camera: &pointing.icrs_to_camera,
+            places,
+        };
+        wcs::add_projection(&mut header, &view, RowOrder::TopDown);
         let sky = Sky {
             truth: json(&rows)?,
             quaternion: attitude.to_quaternion(),

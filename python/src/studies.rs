@@ -53,6 +53,7 @@ pub fn validate(
     threads: NonZeroUsize,
 ) -> PyResult<String> {
     let protocol = validation::Protocol {
+        site: None,
         setup: stated.setup()?,
         scale_known,
         seed,

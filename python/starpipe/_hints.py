@@ -119,6 +119,40 @@ def site(location: Any) -> tuple[float, float, float] | None:
     return lat, lon, height
 
 
+def air_at_site(air: Any, site: Any) -> tuple[float, float] | None:
+    """Return pressure in hPa and temperature in °C."""
+    if air is None:
+        return None
+    if site is None:
+        raise ValueError("air is that of a site: give the site, too")
+    if not np.iterable(air) or len(tuple(air)) != 2:
+        raise ValueError("air must be (pressure, temperature)")
+    pressure, temperature = air
+    if hasattr(temperature, "to_value"):
+        from astropy.units import temperature as converted
+
+        temperature = temperature.to_value("deg_C", equivalencies=converted())
+    hpa = within(pressure, "hPa", "pressure", 0.0, 1200.0)
+    celsius = within(temperature, "", "temperature", -100.0, 70.0)
+    assert hpa is not None and celsius is not None
+    return hpa, celsius
+
+
+def velocity_km_s(velocity: Any) -> tuple[float, float, float] | None:
+    """Return a velocity in km/s along three axes."""
+    if velocity is None:
+        return None
+    if hasattr(velocity, "get_xyz"):
+        velocity = velocity.get_xyz()
+    along = tuple(velocity) if np.iterable(velocity) else ()
+    if len(along) != 3:
+        raise ValueError("velocity must be (vx, vy, vz)")
+    found = [within(value, "km/s", "velocity", -3e4, 3e4) for value in along]
+    x, y, z = found
+    assert x is not None and y is not None and z is not None
+    return x, y, z
+
+
 def header_date(header: Any) -> str | None:
     """Return the date of a header; one that is none is not used, as when a file is read."""
     text = str(header.get("DATE-OBS", "")).strip()

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
 from ._hints import (
     NAME_ODDS,
     RADIUS_DEG,
+    air_at_site,
     direction,
     header_date,
     header_exposure,
     iso_date,
     positive,
+    velocity_km_s,
     whole_number,
     within,
 )
@@ -42,6 +44,13 @@ class SolveOptions(TypedDict, total=False):
         When the frame was taken, in UTC. By default of the header or the file's name.
     site : EarthLocation or (latitude, longitude[, height])
         Where it was taken, in degrees and metres.
+    air : (pressure, temperature)
+        The air at the site, in hPa and °C, for refraction; by default of the standard atmosphere.
+    velocity : CartesianRepresentation or (vx, vy, vz)
+        Velocity of a spacecraft relative to the Earth's centre in km/s, along the axes of ICRS.
+    frame_of : {"icrs", "apparent"}
+        Which directions the attitude refers to: those of the catalogue, or those from which light
+        reaches the camera, with aberration and refraction.
     exposure : Quantity or float
         Exposure in seconds. By default of the header.
     zenith_distance : Angle or float
@@ -74,6 +83,9 @@ class SolveOptions(TypedDict, total=False):
     radius: Angle | Quantity | float
     date: Time | str | Any | None
     site: EarthLocation | tuple[float, ...] | None
+    air: tuple[Quantity | float, Quantity | float] | None
+    velocity: Any | None
+    frame_of: Literal["icrs", "apparent"]
     exposure: Quantity | float | None
     zenith_distance: Angle | Quantity | float | None
     extinction: Quantity | float | None
@@ -97,6 +109,9 @@ def solve_options(
     radius: Any = RADIUS_DEG,
     date: Any = None,
     site: Any = None,
+    air: Any = None,
+    velocity: Any = None,
+    frame_of: Any = "icrs",
     exposure: Any = None,
     zenith_distance: Any = None,
     extinction: Any = None,
@@ -123,6 +138,9 @@ def solve_options(
         "radius_deg": positive(radius, "deg", "radius", 180.000001),
         "date": iso_date(date),
         "site": geodetic(site),
+        "air": air_at_site(air, site),
+        "velocity_km_s": velocity_km_s(velocity),
+        "frame_of": str(frame_of),
         "exposure_s": positive(exposure, "s", "exposure"),
         "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
         "extinction_mag_per_airmass": within(extinction, "mag", "extinction", 0.0, 10.0),

@@ -1,6 +1,6 @@
 //! A row of the table of frames.
 
-use crate::base::coords::{Icrs, UnitVector};
+use crate::base::coords::{Camera, Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::table::{Column, columns};
 use crate::base::units::DEG_PER_RAD;
@@ -158,6 +158,7 @@ impl FrameRow {
             return self;
         };
         let (camera, sky) = (&found.camera, found.icrs_to_camera.inverse());
+        let direction = |seen: &UnitVector<Camera>| found.places.astrometric(&sky.apply(seen));
         let [top_left, top_right, bottom_left, bottom_right] = camera.corners();
         let outline = [top_left, top_right, bottom_right, bottom_left];
         let corners = outline.map(|pixel| camera.direction_of(&pixel));
@@ -166,10 +167,10 @@ impl FrameRow {
             s_fov: Some((diameter_deg * 1e5).round() / 1e5),
             s_region: match corners {
                 [Some(a), Some(b), Some(c), Some(d)] => {
-                    polygon(&[a, b, c, d].map(|corner| sky.apply(&corner)))
+                    polygon(&[a, b, c, d].map(|corner| direction(&corner)))
                 }
                 // The corners of an all-sky frame see nothing.
-                _ => circle(&sky.apply(&UnitVector::BORESIGHT), 0.5 * diameter_deg),
+                _ => circle(&direction(&UnitVector::BORESIGHT), 0.5 * diameter_deg),
             },
             ..self
         }

@@ -237,9 +237,26 @@ impl Rotation<Icrs, Camera> {
         ]))
     }
 
+    /// The boresight.
+    pub fn boresight(&self) -> UnitVector<Icrs> {
+        self.inverse().apply(&UnitVector::BORESIGHT)
+    }
+
+    /// The attitude after the shortest turn that brings the boresight to this direction.
+    pub fn turned_to(&self, boresight: &UnitVector<Icrs>) -> Self {
+        let before = self.boresight();
+        let normal = boresight.as_vector().cross(before.as_vector());
+        let sine = normal.norm();
+        if sine == 0.0 {
+            return *self;
+        }
+        let turn = Rotation3::new(normal * (boresight.angle_to(&before) / sine));
+        Self::from_matrix(self.matrix() * turn.matrix())
+    }
+
     /// The boresight, and the position angle of image-up (−y) there in radians, in (−π, π].
     pub fn boresight_and_up(&self) -> (UnitVector<Icrs>, f64) {
-        let boresight = self.inverse().apply(&UnitVector::BORESIGHT);
+        let boresight = self.boresight();
         let (east, north) = boresight.east_north();
         let up = -self.matrix().row(1).transpose();
         (boresight, libm::atan2(up.dot(&east), up.dot(&north)))

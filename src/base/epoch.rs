@@ -51,6 +51,12 @@ pub struct ObservationDate {
 }
 
 impl ObservationDate {
+    /// The epoch J2000.0.
+    pub(crate) const J2000: Self = Self {
+        day: jiff::civil::date(2000, 1, 1),
+        time: Some(MIDDAY),
+    };
+
     /// The date in the file name of `path`, in the formats of capture programs:
     /// `2019-07-29T204726`, `2019-07-29_20-47-26`, `20190729_204726`, `20190729204726`, or the day
     /// alone.

@@ -1,6 +1,7 @@
 //! The stars observed in one frame: the input of identification.
 
 use crate::base::coords::PixelPoint;
+use crate::sky::places::StarPlaces;
 
 /// Position of a source in the frame's list of sources: its detections, or the lines of a centroid
 /// list.
@@ -65,8 +66,8 @@ pub struct StarField {
     pub height_px: f64,
     /// What the magnitudes of `stars` mean.
     pub photometry: Photometry,
-    /// Date of the frame, in Julian years since J2000.0, for proper motion.
-    pub years_since_j2000: f64,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
     /// Standard deviation of the PSF before pixel integration, in pixels. Without it no catalogue
     /// stars are treated as blended.
     pub spot_sigma_px: Option<f64>,
@@ -106,7 +107,7 @@ impl StarField {
             width_px,
             height_px,
             photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
             spot_sigma_px: None,
             stars: places.iter().enumerate().map(star).collect(),
         }

@@ -134,7 +134,7 @@ impl Hypothesis {
         SkyView {
             camera: &self.camera,
             icrs_to_camera: &self.icrs_to_camera,
-            years_since_j2000: field.years_since_j2000,
+            places: field.places,
         }
     }
 

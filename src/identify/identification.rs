@@ -4,7 +4,9 @@ use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::camera::CameraModel;
 use crate::identify::field::SourceIndex;
 use crate::sky::catalog::StarIndex;
-use nalgebra::Matrix3;
+use crate::sky::places::{AttitudeFrame, StarPlaces};
+use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Fewest stars that can be identified: a triangle, and one star that confirms it.
 pub const MIN_STARS: usize = 4;
@@ -15,8 +17,10 @@ pub const MIN_STARS: usize = 4;
 pub struct Identification {
     /// The camera's geometry: pixel to direction.
     pub camera: CameraModel,
-    /// The attitude.
+    /// The attitude: from apparent directions, in ICRS axes, to camera axes.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
     /// Covariance of the attitude error, as small rotations about the camera's x, y and z axes, in
     /// rad².
     pub attitude_covariance_rad2: Matrix3<f64>,
@@ -45,6 +49,24 @@ impl Identification {
         }
     }
 
+    /// Adds the errors of aberration by the Earth's motion at an unknown date.
+    pub fn add_unknown_aberration(&mut self) {
+        /// The Earth's mean speed about the Sun over that of light.
+        const SPEED_C: f64 = 9.936e-5;
+        let ecliptic_pole = Vector3::new(0.0, -0.397_777, 0.917_482);
+        let boresight = self.icrs_to_camera.boresight();
+        let in_ecliptic = boresight.as_vector().cross(&ecliptic_pole).norm();
+        let along = SPEED_C * in_ecliptic * FRAC_1_SQRT_2;
+        self.focal_length_sigma_px = self
+            .focal_length_sigma_px
+            .hypot(along * self.camera.central_focal_length_px());
+    }
+
+    /// The attitude relative to these directions.
+    pub fn attitude(&self, frame: AttitudeFrame) -> Rotation<Icrs, Camera> {
+        self.places.attitude(&self.icrs_to_camera, frame)
+    }
+
     /// Standard errors of the attitude about the camera's x, y and z axes, in radians.
     pub fn attitude_sigma_rad(&self) -> [f64; 3] {
         self.attitude_covariance_rad2
@@ -62,8 +84,8 @@ pub struct StarMatch {
     pub source: SourceIndex,
     /// The catalogue star.
     pub star: StarIndex,
-    /// Direction of its light at the date of the frame: that of the star, or of the light of all
-    /// stars blended with it.
+    /// Apparent direction of its light: that of the star, or of the light of all stars blended with
+    /// it.
     pub light: UnitVector<Icrs>,
     /// Distance between the observed position and that of its light, in pixels of an ideal pinhole
     /// camera.

@@ -5,6 +5,7 @@ use crate::camera::CameraModel;
 use crate::identify::index::IndexedCatalog;
 use crate::sky::catalog::StarIndex;
 use crate::sky::catalog::sky_grid::{GridStar, chord_of};
+use crate::sky::places::StarPlaces;
 
 /// Margin outside the frame, in units of its diagonal, within which a predicted star may still be
 /// observed.
@@ -24,7 +25,7 @@ const DEEPER_MAG: f64 = 0.7;
 pub struct PredictedStar {
     /// Position in the frame.
     pub pixel: PixelPoint,
-    /// Direction at the date of the frame.
+    /// Apparent direction.
     pub direction: UnitVector<Icrs>,
     /// V magnitude.
     pub v_mag: f32,
@@ -32,15 +33,15 @@ pub struct PredictedStar {
     pub star: StarIndex,
 }
 
-/// A camera, its attitude, and the date.
+/// A camera, its attitude, and where stars appear.
 #[derive(Debug, Clone, Copy)]
 pub struct SkyView<'a> {
     /// The camera.
     pub camera: &'a CameraModel,
     /// The attitude.
     pub icrs_to_camera: &'a Rotation<Icrs, Camera>,
-    /// Date in Julian years since J2000.0, for proper motion.
-    pub years_since_j2000: f64,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
 }
 
 /// How deep to predict: at least a number of stars, and all to a magnitude.
@@ -237,7 +238,7 @@ fn project(
         // No branches here, so that the memory accesses overlap.
         let directions = lanes.map(|lane| {
             lane.map_or(boresight, |star: &GridStar| {
-                sky.stars()[star.index.get()].direction_at(view.years_since_j2000)
+                view.places.of(&sky.stars()[star.index.get()])
             })
         });
         for (lane, direction) in lanes.iter().zip(directions) {

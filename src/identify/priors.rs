@@ -6,6 +6,8 @@ use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
 use crate::camera::{self};
 use crate::sky::observer::Site;
+use crate::sky::places::StarPlaces;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 /// What is known of a frame beforehand; by default nothing.
@@ -37,6 +39,8 @@ pub struct Priors {
     pub date: Option<FrameDate>,
     /// Where it was taken.
     pub site: Option<Site>,
+    /// The observer's velocity relative to the Earth's centre, in ICRS axes, where it is not a site's.
+    pub velocity_km_s: Option<Vector3<f64>>,
     /// Exposure time, in seconds.
     pub exposure_s: Option<f64>,
 }
@@ -178,10 +182,15 @@ impl Priors {
         }
     }
 
-    /// Julian years from J2000.0 to the frame's date; 0 where that is unknown.
-    pub fn years_since_j2000(&self) -> f64 {
-        self.date
-            .map_or(0.0, |known| known.date.years_since_j2000())
+    /// Where the catalogue's stars appear: at J2000.0, without aberration, where the date is not known.
+    ///
+    /// Refraction needs a time that can be trusted: names of files have local times.
+    pub fn places(&self) -> StarPlaces {
+        let Some(FrameDate { date, source }) = &self.date else {
+            return StarPlaces::default();
+        };
+        let site = self.site.filter(|_| *source != DateSource::FileName);
+        StarPlaces::at(date, site, self.velocity_km_s)
     }
 
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if

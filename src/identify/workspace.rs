@@ -17,6 +17,7 @@ use crate::identify::search::{
     Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers, Window,
     Windows,
 };
+use crate::sky::places::StarPlaces;
 use std::f64::consts::PI;
 
 /// Numbers of stars, the brightest, that decide how much distortion is fitted. Where most
@@ -59,7 +60,7 @@ pub const NAME_ODDS: f64 = 100.0;
 ///     width_px: frame.width as f64,
 ///     height_px: frame.height as f64,
 ///     photometry: Photometry::Instrumental,
-///     years_since_j2000: 0.0,
+///     places: StarPlaces::default(),
 ///     spot_sigma_px: Some(detections.spot_sigma_px),
 ///     stars: detections.sources.iter().enumerate().map(observed).collect(),
 /// };
@@ -432,7 +433,7 @@ fn answered<'a>(
     let mut matches = answer.take().map_or_else(Vec::new, |old| old.matches);
     matches.clear();
     matches.extend(pairs.iter().map(|pair| star_match(pair, field)));
-    answer.insert(identification(refined, log10, matches))
+    answer.insert(identification(refined, log10, matches, field.places))
 }
 
 /// The final fit, to all stars with a sure name, with as much distortion as they support; the
@@ -558,6 +559,7 @@ fn identification(
     refined: &Refined,
     log10_false_alarm: f64,
     matches: Vec<StarMatch>,
+    places: StarPlaces,
 ) -> Identification {
     let fit = &refined.fit;
     let covariance = &fit.covariance;
@@ -567,6 +569,7 @@ fn identification(
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * fit.camera.central_focal_length_px(),
         camera: known_part(&fit.camera, &fit.icrs_to_camera, &matches),
         icrs_to_camera: fit.icrs_to_camera,
+        places,
         excess_sigma_px: refined.excess_sigma_px,
         rms_px: (sum_sq / matches.len().max(1) as f64).sqrt(),
         matches,

@@ -125,6 +125,7 @@ mod tests {
     use crate::camera::CameraModel;
     use crate::detect::Detections;
     use crate::identify::{Identification, SourceIndex};
+    use crate::sky::places::StarPlaces;
     use nalgebra::Matrix3;
 
     const SIDE_PX: f64 = 400.0;
@@ -150,6 +151,7 @@ mod tests {
             p_chance: 0.001,
         });
         let identification = Identification {
+            places: StarPlaces::default(),
             camera: CameraModel::pinhole(SIDE_PX, SIDE_PX, 2000.0, false),
             icrs_to_camera: Rotation::looking_at(&centre, 0.0),
             attitude_covariance_rad2: Matrix3::zeros(),
@@ -166,7 +168,7 @@ mod tests {
         let frame = IdentifiedFrame {
             detections: &detections,
             identification: &identification,
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
             exposure_s: None,
             vignetting: 0.0,
         };

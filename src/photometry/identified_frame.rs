@@ -2,6 +2,7 @@
 
 use crate::detect::Detections;
 use crate::identify::Identification;
+use crate::sky::places::StarPlaces;
 
 /// An identified frame.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +12,7 @@ pub struct IdentifiedFrame<'a> {
     /// Camera, attitude and matches; the matches are indices into the detections.
     pub identification: &'a Identification,
     /// Date of the frame, in Julian years since J2000.0.
-    pub years_since_j2000: f64,
+    pub places: StarPlaces,
     /// Exposure in seconds, where known.
     pub exposure_s: Option<f64>,
     /// Share of the light lost in the corners, as far as it is known.

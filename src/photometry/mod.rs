@@ -60,7 +60,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
     let view = SkyView {
         camera: &frame.identification.camera,
         icrs_to_camera: &frame.identification.icrs_to_camera,
-        years_since_j2000: frame.years_since_j2000,
+        places: frame.places,
     };
     let predicted = view.stars_to(sky, depth_v_mag(frame, sky));
     let Association { stars, chance } = associate(frame, &predicted);

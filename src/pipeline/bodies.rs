@@ -152,6 +152,7 @@ mod tests {
     use crate::camera::CameraModel;
     use crate::identify::{FrameDate, StarMatch};
     use crate::sky::catalog::StarIndex;
+    use crate::sky::places::StarPlaces;
     use crate::sky::solar_system::bodies_at;
     use nalgebra::Matrix3;
 
@@ -183,6 +184,7 @@ mod tests {
             })
         });
         let found = Identification {
+            places: StarPlaces::default(),
             camera,
             icrs_to_camera,
             attitude_covariance_rad2: Matrix3::zeros(),

@@ -4,6 +4,7 @@ use crate::detect::{Detection, Detections};
 use crate::identify::{Identification, IndexedCatalog, PredictedStar, SkyView};
 use crate::photometry::resolved_px;
 use crate::sky::catalog::StarIndex;
+use crate::sky::places::StarPlaces;
 use std::collections::HashSet;
 use std::fmt;
 
@@ -53,7 +54,7 @@ pub(super) struct NamedFrame<'a> {
     pub detections: &'a Detections,
     pub identification: &'a Identification,
     pub indexed: &'a IndexedCatalog<'a>,
-    pub years_since_j2000: f64,
+    pub places: StarPlaces,
 }
 
 impl NamedFrame<'_> {
@@ -63,7 +64,7 @@ impl NamedFrame<'_> {
         let view = SkyView {
             camera: &found.camera,
             icrs_to_camera: &found.icrs_to_camera,
-            years_since_j2000: self.years_since_j2000,
+            places: self.places,
         };
         let spot_px = self.detections.spot_sigma_px;
         let border_px = (BORDER_SIGMAS * spot_px).max(BORDER_PX);

@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::identification::{attempt, identified, observation};
+use super::identification::{attempt, identified, observation, through_air_or_not};
 use super::left_out::{LeftOut, RowProblem};
 use super::note::Note;
 use super::solution::{Solution, Source};
@@ -12,6 +12,7 @@ use crate::detect::DetectionFlags;
 use crate::identify::{
     ObservedStar, Photometry, Priors, ScalePrior, ScaleSource, SourceIndex, StarField,
 };
+use crate::sky::places::StarPlaces;
 use std::collections::HashMap;
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.
@@ -116,7 +117,7 @@ impl CentroidList {
 
     /// The star field of a list that is sorted by brightness, observed this many Julian years after
     /// J2000.0.
-    pub fn star_field(&self, years_since_j2000: f64) -> StarField {
+    pub fn star_field(&self, places: StarPlaces) -> StarField {
         let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
             source: SourceIndex::new(line),
             position: centroid.position,
@@ -130,7 +131,7 @@ impl CentroidList {
             width_px: self.width as f64,
             height_px: self.height as f64,
             photometry: self.photometry,
-            years_since_j2000,
+            places,
             spot_sigma_px: None,
             stars: stars.map(observed).collect(),
         }
@@ -204,15 +205,13 @@ pub fn solve_centroids(
         ..context.priors
     };
     let (list, left_out) = list.usable();
-    let field = list.star_field(priors.years_since_j2000());
-    let found = attempt(
-        (&field, None),
-        priors,
-        context,
-        &mut workspace.identify,
-        &mut clock,
-    );
-    let mut outcome = identified(found, None, &field, priors, context.indexed);
+    let (mut outcome, _) = through_air_or_not(priors.places(), |places| {
+        let field = list.star_field(places);
+        let field_and_coarser = (&field, None);
+        let workspace = &mut workspace.identify;
+        let found = attempt(field_and_coarser, priors, context, workspace, &mut clock);
+        identified(found, None, &field, priors, context.indexed)
+    });
     let observation = observation(&outcome, priors);
     let source = |centroid: &ListedCentroid| Source {
         position: centroid.position,
@@ -230,6 +229,7 @@ pub fn solve_centroids(
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
     let notes = notes.chain(Note::of_residuals(outcome.identification()));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
+    let notes = notes.chain(Note::of_date(priors, &outcome));
     Solution {
         width: list.width,
         height: list.height,
@@ -242,6 +242,7 @@ pub fn solve_centroids(
         sources,
         background: None,
         attitude_only: context.attitude_only,
+        attitude_frame: context.attitude_frame,
         outcome,
         bodies,
         photometry: None,

@@ -258,6 +258,7 @@ mod tests {
     use super::*;
     use crate::detect::DetectionFlags;
     use crate::pipeline::LeftOut;
+    use crate::sky::places::StarPlaces;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
         CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())
@@ -308,7 +309,7 @@ mod tests {
         assert!(list.centroids[0].flags.saturated && list.centroids[0].flags.border);
         // Sources that are not stars stay in the list but not in the star field.
         assert!(list.centroids[1].flags.trail);
-        let field = list.star_field(0.0);
+        let field = list.star_field(StarPlaces::default());
         assert_eq!(field.stars.len(), 1);
         assert!(field.stars[0].is_saturated);
         let other = of_frame("b.png").unwrap();

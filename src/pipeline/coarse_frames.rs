@@ -8,6 +8,7 @@ use crate::base::coords::PixelPoint;
 use crate::detect::{self, DetectConfig, detect};
 use crate::frame::Frame;
 use crate::identify::{CoarserFields, ObservedStar, StarField};
+use crate::sky::places::StarPlaces;
 use std::cell::{OnceCell, RefCell};
 
 /// Sides of the blocks of pixels that are averaged, the cheapest first.
@@ -23,7 +24,7 @@ const MAX_DETECTIONS: usize = 1000;
 pub(super) struct CoarseFrames<'a> {
     frame: &'a Frame<'a>,
     detector: RefCell<&'a mut detect::Workspace>,
-    years_since_j2000: f64,
+    places: StarPlaces,
     fields: [OnceCell<Option<StarField>>; FACTORS.len()],
 }
 
@@ -31,12 +32,12 @@ impl<'a> CoarseFrames<'a> {
     pub fn new(
         frame: &'a Frame<'a>,
         detector: &'a mut detect::Workspace,
-        years_since_j2000: f64,
+        places: StarPlaces,
     ) -> Self {
         Self {
             frame,
             detector: RefCell::new(detector),
-            years_since_j2000,
+            places,
             fields: Default::default(),
         }
     }
@@ -59,7 +60,7 @@ impl<'a> CoarseFrames<'a> {
             ..DetectConfig::default()
         };
         let detections = detect(&coarse, &config, &mut detector).ok()?;
-        let field = star_field(&coarse, &detections, self.years_since_j2000);
+        let field = star_field(&coarse, &detections, self.places);
         let scale = factor as f64;
         // The middle of the first block.
         let first_px = (scale - 1.0) / 2.0;
@@ -111,7 +112,7 @@ mod tests {
         let pixels = (0..300 * 320).map(|i| light(i % 320, i / 320)).collect();
         let frame = Frame::new(320, 300, pixels).unwrap();
         let mut detector = detect::Workspace::new();
-        let coarser = CoarseFrames::new(&frame, &mut detector, 0.0);
+        let coarser = CoarseFrames::new(&frame, &mut detector, StarPlaces::default());
         for number in 0..coarser.count() {
             let field = coarser.field(number).unwrap();
             assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
@@ -124,7 +125,7 @@ mod tests {
         let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
         let mut detector = detect::Workspace::new();
         assert!(
-            CoarseFrames::new(&small, &mut detector, 0.0)
+            CoarseFrames::new(&small, &mut detector, StarPlaces::default())
                 .field(0)
                 .is_none()
         );

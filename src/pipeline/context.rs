@@ -7,6 +7,7 @@ use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
 use crate::identify::{self, DateSource, Effort, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
 use crate::photometry::comparison::ObservingSetup;
+use crate::sky::places::AttitudeFrame;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -30,6 +31,8 @@ pub struct Context<'a> {
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
     /// nothing is measured that needs the names.
     pub attitude_only: bool,
+    /// Which directions reported attitudes refer to.
+    pub attitude_frame: AttitudeFrame,
     /// A star is named where the odds are at least this many to 1 that the name is right, and at least
     /// 1 to 1: else a star would have several.
     pub name_odds: f64,
@@ -52,6 +55,7 @@ impl<'a> Context<'a> {
             camera: None,
             calibration: None,
             attitude_only: false,
+            attitude_frame: AttitudeFrame::default(),
             name_odds: NAME_ODDS,
             effort: Effort::Normal,
             as_stored: false,

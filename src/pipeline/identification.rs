@@ -16,6 +16,7 @@ use crate::identify::{
     SearchFailure, SourceIndex, StarField,
 };
 use crate::sky::observer::Observation;
+use crate::sky::places::{AttitudeFrame, StarPlaces};
 use std::collections::HashSet;
 
 /// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched
@@ -23,25 +24,24 @@ use std::collections::HashSet;
 pub(super) fn identify_stars(
     frame: &Frame,
     detections: &Detections,
-    priors: &Priors,
+    (priors, places): (&Priors, StarPlaces),
     context: &Context,
     workspace: &mut Workspace,
     clock: &mut Stopwatch,
 ) -> (Outcome, Option<ScalePrior>) {
-    let field = star_field(frame, detections, priors.years_since_j2000());
+    let field = star_field(frame, detections, places);
     let Workspace {
         identify: workspace,
         detect: detector,
         ..
     } = workspace;
     let (mut found, dropped_scale) = {
-        let coarser = CoarseFrames::new(frame, detector, priors.years_since_j2000());
+        let coarser = CoarseFrames::new(frame, detector, places);
         search((&field, &coarser), priors, context, workspace, clock)
     };
     if found.is_err() && may_be_wide(detections) {
         let is_star = |source: &Detection| source.flags.may_be_wide_star();
-        let years = priors.years_since_j2000();
-        let wide = field_of(is_star, frame, detections, years);
+        let wide = field_of(is_star, frame, detections, places);
         let second = attempt((&wide, None), &priors.binding(), context, workspace, clock);
         if let Some(second) = second.ok().and_then(at_second_attempt) {
             found = Ok(second);
@@ -60,6 +60,24 @@ pub(super) fn identify_stars(
         outcome => outcome,
     };
     (outcome, dropped_scale)
+}
+
+/// Identifies a frame with these places. Without refraction where that fails, or shows stars through the
+/// ground: then the time or the site is wrong. Also returns the places that were used last.
+pub(super) fn through_air_or_not(
+    places: StarPlaces,
+    mut identify: impl FnMut(StarPlaces) -> Outcome,
+) -> (Outcome, StarPlaces) {
+    let outcome = identify(places);
+    let is_above = |outcome: &Outcome| {
+        let found = outcome.identification();
+        found.is_some_and(|found| !places.is_below_horizon(&found.icrs_to_camera.boresight()))
+    };
+    if !places.has_refraction() || is_above(&outcome) {
+        return (outcome, places);
+    }
+    let airless = places.without_refraction();
+    (identify(airless), airless)
 }
 
 /// Whether every star of an identified frame is there twice. Then the attitude is that of one of the
@@ -196,7 +214,12 @@ pub(super) fn identified(
     indexed: &IndexedCatalog,
 ) -> Outcome {
     let failure = match found {
-        Ok(found) => return Outcome::Identified(Box::new(found)),
+        Ok(mut found) => {
+            if priors.date.is_none() {
+                found.add_unknown_aberration();
+            }
+            return Outcome::Identified(Box::new(found));
+        }
         Err(failure) => failure,
     };
     let case = Unidentified {
@@ -213,6 +236,6 @@ pub(super) fn identified(
 /// known.
 pub(super) fn observation(outcome: &Outcome, priors: &Priors) -> Option<Observation> {
     let found = outcome.identification()?;
-    let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+    let (boresight, _) = found.attitude(AttitudeFrame::Icrs).boresight_and_up();
     Observation::new(priors.site?, &priors.date?.date, &boresight)
 }

@@ -63,6 +63,8 @@ pub enum Note {
         /// How far below, in radians.
         depth_rad: f64,
     },
+    /// The date is unknown.
+    NoDate,
     /// The site is known but not the time of day, so there is no zenith distance.
     NoTimeOfDay,
     /// The exposure is unknown, so nothing can be predicted for the stated camera.
@@ -122,6 +124,7 @@ impl Note {
             Self::MoreStars { .. } => "more_stars",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
+            Self::NoDate => "date_unknown",
             Self::NoTimeOfDay => "time_of_day_unknown",
             Self::NoExposure => "exposure_unknown",
             Self::Camera(contradiction) => contradiction.code(),
@@ -139,6 +142,30 @@ impl Note {
             Self::AttitudeOnly => "attitude_only",
             Self::LargeResiduals { .. } => "large_residuals",
         }
+    }
+
+    /// The text of a note that says the same of every frame.
+    const fn fixed_text(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::BrightnessUnknown => {
+                "the list has no flux and no magnitude; its rows were taken to be in order of brightness"
+            }
+            Self::NoDate => {
+                "the date is not known: star positions are those of 2000, without aberration, and the \
+                 stated error of the focal length includes that"
+            }
+            Self::NoTimeOfDay => {
+                "the time of day is not known, and so the site gives no zenith distance and no refraction"
+            }
+            Self::AttitudeOnly => {
+                "attitude and optics are from the brightest stars; no other star was looked up, and no \
+                 magnitude was measured"
+            }
+            Self::NoExposure => {
+                "the exposure is not known, and so nothing is predicted of the camera"
+            }
+            _ => return None,
+        })
     }
 
     /// What the file says of its picture.
@@ -176,6 +203,12 @@ impl Note {
     pub(super) fn of_pointing(attitude_only: bool, outcome: &Outcome) -> Option<Self> {
         let is_found = outcome.identification().is_some();
         (attitude_only && is_found).then_some(Self::AttitudeOnly)
+    }
+
+    /// What an identified frame without a date lacks.
+    pub(super) fn of_date(priors: &Priors, outcome: &Outcome) -> Option<Self> {
+        let lacks_date = priors.date.is_none() && outcome.identification().is_some();
+        lacks_date.then_some(Self::NoDate)
     }
 
     /// A contradiction between site, date and attitude, or what an observation lacks.
@@ -265,6 +298,11 @@ impl Note {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::BrightnessUnknown
+            | Self::NoDate
+            | Self::NoTimeOfDay
+            | Self::NoExposure
+            | Self::AttitudeOnly => f.write_str(self.fixed_text().unwrap_or_default()),
             Self::IgnoredHeader(value) => value.fmt(f),
             Self::LargestImage(choice) => choice.fmt(f),
             Self::Orientation(orientation) => write!(
@@ -274,9 +312,6 @@ impl fmt::Display for Note {
             ),
             Self::Assumed(assumption) => assumption.fmt(f),
             Self::RowsLeftOut(rows) => rows.fmt(f),
-            Self::BrightnessUnknown => f.write_str(
-                "the list has no flux and no magnitude; its rows were taken to be in order of brightness",
-            ),
             Self::DefectiveColumns(columns) => write_columns(f, columns),
             Self::ColorMosaic(mosaic) => write_mosaic(f, mosaic),
             Self::WrongHeaderScale {
@@ -292,21 +327,11 @@ impl fmt::Display for Note {
                 "the site, the date and the attitude contradict each other: the frame's centre stands {:.1}° below the horizon",
                 depth_rad * DEG_PER_RAD
             ),
-            Self::NoTimeOfDay => f.write_str(
-                "the time of day is not known, and so the site gives no zenith distance",
-            ),
             Self::MoreStars { wanted } => write!(
                 f,
                 "the brightest {wanted} detections, as many as were to be measured, did not identify the \
                  frame, and so all were measured"
             ),
-            Self::AttitudeOnly => f.write_str(
-                "attitude and optics are from the brightest stars; no other star was looked up, and no \
-                 magnitude was measured",
-            ),
-            Self::NoExposure => {
-                f.write_str("the exposure is not known, and so nothing is predicted of the camera")
-            }
             Self::Camera(contradiction) => contradiction.fmt(f),
             Self::NotLinear { slope, mean_v_mag } => write!(
                 f,

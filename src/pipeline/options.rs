@@ -12,6 +12,7 @@ use crate::identify::{
 use crate::model::sensitivity::Extinction;
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::observer::Site;
+use crate::sky::places::AttitudeFrame;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
@@ -50,6 +51,10 @@ pub struct SolveOptions {
     /// Where they were taken.
     #[serde(serialize_with = "geodetic")]
     pub site: Option<Site>,
+    /// Velocity of a spacecraft relative to the Earth's centre, along the axes of ICRS.
+    pub velocity_km_s: Option<[f64; 3]>,
+    /// Which directions attitudes refer to.
+    pub attitude_frame: AttitudeFrame,
     /// Exposure.
     pub exposure_s: Option<f64>,
     /// Zenith distance of the frames' centres, where a camera is stated.
@@ -102,6 +107,7 @@ impl SolveOptions {
                 source: DateSource::User,
             }),
             site: self.site,
+            velocity_km_s: self.velocity_km_s.map(Into::into),
             exposure_s: self.exposure_s,
         }
     }
@@ -139,6 +145,8 @@ impl Default for SolveOptions {
             radius_deg: Self::DEFAULT_RADIUS_DEG,
             date: None,
             site: None,
+            velocity_km_s: None,
+            attitude_frame: AttitudeFrame::default(),
             exposure_s: None,
             zenith_distance_deg: None,
             extinction_mag_per_airmass: None,
@@ -188,6 +196,7 @@ impl<'a> Context<'a> {
             name_odds: options.name_odds,
             effort: options.effort,
             attitude_only: options.attitude_only,
+            attitude_frame: options.attitude_frame,
             // A limit that is longer than any clock runs is none.
             time_limit: limit_s.and_then(|limit_s| Duration::try_from_secs_f64(limit_s).ok()),
             ..self

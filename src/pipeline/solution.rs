@@ -12,6 +12,7 @@ use crate::identify::{FrameDate, SourceIndex};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::sky::observer::{Observation, Site};
+use crate::sky::places::AttitudeFrame;
 
 /// What was found in one frame, or in one list of centroids.
 #[derive(Debug, Clone)]
@@ -40,6 +41,8 @@ pub struct Solution {
     pub background: Option<Background>,
     /// Whether only attitude and optics were wanted, from the brightest stars.
     pub attitude_only: bool,
+    /// Which directions the reported attitude refers to.
+    pub attitude_frame: AttitudeFrame,
     /// The stars and the attitude, or why they were not found.
     pub outcome: Outcome,
     /// The Moon and the planets in an identified frame whose date is known.

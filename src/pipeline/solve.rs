@@ -3,7 +3,7 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
-use super::identification::{double_image, identify_stars, observation};
+use super::identification::{double_image, identify_stars, observation, through_air_or_not};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::prepared::Prepared;
@@ -17,6 +17,7 @@ use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig, DetectError, Detections};
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
+use crate::sky::places::StarPlaces;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -222,13 +223,14 @@ fn solve(
         mosaic,
         mut outcome,
         dropped_scale,
+        places,
     } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     let double_image = if context.attitude_only {
         None
     } else {
-        let field = star_field(frame, &detections, priors.years_since_j2000());
+        let field = star_field(frame, &detections, places);
         double_image(&mut outcome, &field)
     };
     clock.lap(Stage::Identify);
@@ -240,6 +242,7 @@ fn solve(
         mosaic,
         observation: observation(&outcome, &priors),
         priors,
+        places,
         detections,
         sources,
         outcome,
@@ -275,6 +278,8 @@ struct FoundStars {
     outcome: Outcome,
     /// The scale that was dropped because nothing matched with it.
     dropped_scale: Option<ScalePrior>,
+    /// Where the catalogue's stars appear.
+    places: StarPlaces,
 }
 
 impl StarSearch<'_, '_> {
@@ -296,13 +301,20 @@ impl StarSearch<'_, '_> {
         let mosaic = self.mosaic.map(restore);
         clock.lap(Stage::Detect);
         let (priors, context) = (self.priors, self.context);
-        let (outcome, dropped_scale) =
-            identify_stars(frame, &detections, priors, context, self.workspace, clock);
+        let mut dropped_scale = None;
+        let (outcome, places) = through_air_or_not(priors.places(), |places| {
+            let known = (priors, places);
+            let (outcome, dropped) =
+                identify_stars(frame, &detections, known, context, self.workspace, clock);
+            dropped_scale = dropped;
+            outcome
+        });
         Ok(Some(FoundStars {
             detections,
             mosaic,
             outcome,
             dropped_scale,
+            places,
         }))
     }
 }
@@ -339,6 +351,7 @@ fn not_in_time(
         sources: Vec::new(),
         background: None,
         attitude_only: context.attitude_only,
+        attitude_frame: context.attitude_frame,
         outcome: Outcome::NotIdentified(Reason::Search(SearchFailure::Interrupted)),
         bodies: Vec::new(),
         photometry: None,

@@ -18,6 +18,7 @@ use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
+use crate::sky::places::StarPlaces;
 use std::collections::HashSet;
 
 /// What the stages found in a frame.
@@ -29,6 +30,8 @@ pub(super) struct SolvedFrame<'a> {
     /// What follows from the mosaic of a raw color frame.
     pub mosaic: Option<RawColor>,
     pub priors: Priors,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
     pub detections: Detections,
     /// The detections as sources.
     pub sources: Vec<Source>,
@@ -55,7 +58,7 @@ impl SolvedFrame<'_> {
         let frame = IdentifiedFrame {
             detections: &self.detections,
             identification,
-            years_since_j2000: self.priors.years_since_j2000(),
+            places: self.places,
             exposure_s: self.priors.exposure_s,
             vignetting: self.stated_vignetting(),
         };
@@ -134,6 +137,7 @@ impl SolvedFrame<'_> {
             observation: self.observation,
             site: self.priors.site,
             attitude_only: self.context.attitude_only,
+            attitude_frame: self.context.attitude_frame,
             outcome: self.outcome,
             bodies: self.bodies,
             photometry: self.photometry,
@@ -175,6 +179,7 @@ impl SolvedFrame<'_> {
             .chain(Note::of_residuals(outcome.identification()))
             .chain(Note::of_pointing(!is_named, outcome))
             .chain(self.notes_of_bright_stars())
+            .chain(Note::of_date(priors, outcome))
             .collect()
     }
 
@@ -187,7 +192,7 @@ impl SolvedFrame<'_> {
             detections: &self.detections,
             identification,
             indexed: self.context.indexed,
-            years_since_j2000: self.priors.years_since_j2000(),
+            places: self.places,
         };
         let sources = self.bodies.iter().filter_map(|body| body.source);
         let known: HashSet<usize> = sources.map(SourceIndex::get).collect();
@@ -207,7 +212,7 @@ impl SolvedFrame<'_> {
         let view = SkyView {
             camera: &found.camera,
             icrs_to_camera: &found.icrs_to_camera,
-            years_since_j2000: self.priors.years_since_j2000(),
+            places: self.places,
         };
         let indexed = self.context.indexed;
         let stars = view.stars_to(indexed, indexed.faintest_v_mag());

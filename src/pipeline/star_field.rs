@@ -4,11 +4,12 @@ use crate::detect::{Detection, Detections};
 use crate::frame::Frame;
 use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 use crate::photometry::instrumental_mag;
+use crate::sky::places::StarPlaces;
 
 /// The detections that may be stars, as identification takes them.
-pub fn star_field(frame: &Frame, detections: &Detections, years_since_j2000: f64) -> StarField {
+pub fn star_field(frame: &Frame, detections: &Detections, places: StarPlaces) -> StarField {
     let is_star = |source: &Detection| source.flags.is_star_like();
-    field_of(is_star, frame, detections, years_since_j2000)
+    field_of(is_star, frame, detections, places)
 }
 
 /// The detections for which `is_star` holds, as identification takes them.
@@ -16,7 +17,7 @@ pub(super) fn field_of(
     is_star: impl Fn(&Detection) -> bool,
     frame: &Frame,
     detections: &Detections,
-    years_since_j2000: f64,
+    places: StarPlaces,
 ) -> StarField {
     let sources = detections.sources.iter().enumerate();
     let stars = sources
@@ -35,7 +36,7 @@ pub(super) fn field_of(
         width_px: frame.width as f64,
         height_px: frame.height as f64,
         photometry: Photometry::Instrumental,
-        years_since_j2000,
+        places,
         spot_sigma_px: Some(detections.spot_sigma_px),
         stars: stars.collect(),
     }

@@ -5,9 +5,10 @@ use super::digits::{
     PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
 };
 use super::frame_report::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport, CompletenessReport,
-    DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport, NoteReport,
-    ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status, TimingReport,
+    ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport,
+    CompletenessReport, DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport,
+    NoteReport, ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status,
+    TimingReport,
 };
 use super::stars::{self, ReportedPointing};
 use super::{bodies, reason};
@@ -24,6 +25,7 @@ use crate::photometry::completeness::MagnitudeBin;
 use crate::pipeline::{Background, Note, Outcome, Solution, Timing};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
+use crate::sky::places::AttitudeFrame;
 use nalgebra::Matrix3;
 
 impl FrameReport {
@@ -66,6 +68,7 @@ impl FrameReport {
             reason_code: None,
             remedies: Vec::new(),
             attitude: None,
+            apparent: None,
             optics: None,
             matched: None,
             magnitude: None,
@@ -84,8 +87,7 @@ impl FrameReport {
                 report.remedies = reason.remedies();
             }
             Outcome::Identified(identification) => {
-                let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
-                report.add_identification(identification, catalog, years);
+                report.add_identification(identification, catalog, solution.attitude_frame);
                 // The faintest of the brightest stars says nothing.
                 report.magnitude = report.magnitude.take().filter(|_| !solution.attitude_only);
                 bodies::add_to(&mut report, &solution.bodies, identification);
@@ -106,21 +108,24 @@ impl FrameReport {
         &mut self,
         identification: &Identification,
         catalog: &Catalog,
-        years: f64,
+        attitude_frame: AttitudeFrame,
     ) {
         self.status = Status::Identified;
         self.attitude = Some(attitude(
-            &identification.icrs_to_camera,
+            &identification.attitude(attitude_frame),
             &identification.attitude_covariance_rad2,
-            boresight_of(&identification.camera),
+            (boresight_of(&identification.camera), attitude_frame),
         ));
+        let places = &identification.places;
+        self.apparent = Some(ApparentReport {
+            aberration: places.has_aberration(),
+            refraction: places.has_refraction(),
+            date_assumed: self.date.is_none(),
+        });
         self.optics = Some(optics(identification));
         self.matched = Some(match_quality(identification, self.stars.len()));
         self.magnitude = faintest(identification, catalog);
-        let pointing = ReportedPointing {
-            identification,
-            years_since_j2000: years,
-        };
+        let pointing = ReportedPointing { identification };
         pointing.add_to(&mut self.stars, catalog);
     }
 }
@@ -170,7 +175,7 @@ fn observation(seen: &Observation) -> ObservationReport {
 pub(super) fn attitude(
     icrs_to_camera: &Rotation<Icrs, Camera>,
     covariance_rad2: &Matrix3<f64>,
-    at: &'static str,
+    (at, frame_of): (&'static str, AttitudeFrame),
 ) -> AttitudeReport {
     let (boresight, up_pa_rad) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
@@ -181,6 +186,7 @@ pub(super) fn attitude(
     let [x, y, roll] = [0, 1, 2].map(sigma);
     AttitudeReport {
         at,
+        frame_of,
         ra_deg: turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         dec_deg: to_decimals(dec_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),

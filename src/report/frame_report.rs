@@ -4,6 +4,7 @@ use crate::base::format::json_escaped;
 use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
+use crate::sky::places::AttitudeFrame;
 use serde::Serialize;
 use std::io;
 
@@ -43,6 +44,8 @@ pub struct FrameReport {
     pub remedies: Vec<Remedy>,
     /// The attitude of the camera.
     pub attitude: Option<AttitudeReport>,
+    /// What shifts the places of the stars and was applied.
+    pub apparent: Option<ApparentReport>,
     /// The fitted camera.
     pub optics: Option<OpticsReport>,
     /// Quality of the identification.
@@ -138,6 +141,9 @@ pub enum Status {
 pub struct AttitudeReport {
     /// What it is the attitude of: the frame's `centre`, or the `axis` of a lens that is no pinhole.
     pub at: &'static str,
+    /// Which directions it refers to: `icrs`, those of the catalogue at the date, or `apparent`, those
+    /// from which light reaches the camera, in ICRS axes.
+    pub frame_of: AttitudeFrame,
     /// Right ascension of the frame's centre, in degrees, in [0, 360).
     pub ra_deg: f64,
     /// Declination of the frame's centre, in degrees.
@@ -149,6 +155,17 @@ pub struct AttitudeReport {
     pub quaternion: [f64; 4],
     /// Standard errors of the attitude.
     pub sigma_arcsec: AttitudeSigma,
+}
+
+/// What shifts the places of the stars and was applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ApparentReport {
+    /// Aberration.
+    pub aberration: bool,
+    /// Refraction.
+    pub refraction: bool,
+    /// Whether the date is unknown, and so taken to be 2000.
+    pub date_assumed: bool,
 }
 
 /// Standard errors of the attitude, as small rotations about the camera's axes, in arcseconds.

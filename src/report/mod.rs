@@ -30,7 +30,7 @@ pub mod wcs;
 
 #[doc(hidden)]
 pub use frame_report::{
-    AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
+    ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
     CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,
     ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SiteReport, StarReport,
     Status, TimingReport,

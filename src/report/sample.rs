@@ -1,6 +1,7 @@
 //! A solution for tests.
 
 use crate::pipeline::{Outcome, Solution, Timing};
+use crate::sky::places::AttitudeFrame;
 
 /// A solution with this `outcome` and nothing else.
 pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
@@ -20,6 +21,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         notes: Vec::new(),
         background: None,
         attitude_only: false,
+        attitude_frame: AttitudeFrame::default(),
         outcome,
         bodies: Vec::new(),
         timing: Timing::default(),

@@ -36,10 +36,9 @@ pub fn detections(found: &Detections) -> Vec<StarReport> {
     sources.map(|source| detection(&source)).collect()
 }
 
-/// Where an identified frame points, and when.
+/// What an identified frame shows.
 pub(super) struct ReportedPointing<'a> {
     pub identification: &'a Identification,
-    pub years_since_j2000: f64,
 }
 
 impl ReportedPointing<'_> {
@@ -49,7 +48,8 @@ impl ReportedPointing<'_> {
             let to_icrs = self.identification.icrs_to_camera.inverse();
             let pixel = PixelPoint::new(star.x, star.y);
             if let Some(direction) = self.identification.camera.direction_of(&pixel) {
-                star.set_direction(&to_icrs.apply(&direction));
+                let apparent = to_icrs.apply(&direction);
+                star.set_direction(&self.identification.places.astrometric(&apparent));
             }
         }
         for star_match in &self.identification.matches {
@@ -62,21 +62,23 @@ impl ReportedPointing<'_> {
     /// Adds the identified star, with its position at the date of the frame.
     fn name(&self, star: &mut StarReport, star_match: &StarMatch, catalog: &Catalog) {
         let known = catalog.star(star_match.star);
-        let direction = known.direction_at(self.years_since_j2000);
+        let places = &self.identification.places;
+        let direction = known.direction_at(places.years_since_j2000());
+        let apparent = places.apparent(&direction);
         star.id = Some(catalog.designation(star_match.star));
         star.name = catalog.full_name(star_match.star);
         star.vmag = finite(f64::from(known.v_mag), 3);
-        star.residual_px = self.residual_px(star, &direction);
+        star.residual_px = self.residual_px(star, &apparent);
         star.p_chance = significant(star_match.p_chance, CHANCE_DIGITS);
         // The light of a single star has exactly the star's direction.
-        let is_blend = star_match.light != direction;
+        let is_blend = star_match.light != apparent;
         star.residual_blend_px = is_blend
             .then(|| self.residual_px(star, &star_match.light))
             .flatten();
         star.set_direction(&direction);
     }
 
-    /// Distance of a detection from what is seen in this direction, in pixels.
+    /// Distance of a detection from what appears in this direction, in pixels.
     fn residual_px(&self, star: &StarReport, direction: &UnitVector<Icrs>) -> Option<f64> {
         let Identification {
             camera,

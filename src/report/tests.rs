@@ -4,6 +4,7 @@ use super::*;
 use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
+use crate::sky::places::AttitudeFrame;
 
 fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
     StarReport {
@@ -49,6 +50,7 @@ fn unidentified() -> FrameReport {
         reason_code: Some("no_match"),
         remedies: vec![Remedy::Fov, Remedy::Near],
         attitude: None,
+        apparent: None,
         optics: None,
         matched: None,
         magnitude: None,
@@ -175,7 +177,13 @@ fn identified() -> FrameReport {
         reason: None,
         reason_code: None,
         remedies: Vec::new(),
+        apparent: Some(ApparentReport {
+            aberration: true,
+            refraction: false,
+            date_assumed: false,
+        }),
         attitude: Some(AttitudeReport {
+            frame_of: AttitudeFrame::Icrs,
             at: "centre",
             ra_deg: 83.822_083_3,
             dec_deg: -1.212_251_2,

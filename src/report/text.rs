@@ -8,6 +8,7 @@ use crate::base::format::{self, counted, decimals_for, printable};
 use crate::base::remedy::{OptionNames, Remedy};
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::identify::DateSource;
+use crate::sky::places::AttitudeFrame;
 
 /// Number of stars listed without [`TextOptions::all_stars`].
 pub const STARS_SHOWN: usize = 20;
@@ -183,8 +184,13 @@ fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
         labelled(
             "",
             &format!(
-                "RA {:.decimals$}°  Dec {:+.decimals$}°  ± {sigma_deg:.decimals$}°  (ICRS)",
-                attitude.ra_deg, attitude.dec_deg
+                "RA {:.decimals$}°  Dec {:+.decimals$}°  ± {sigma_deg:.decimals$}°  ({})",
+                attitude.ra_deg,
+                attitude.dec_deg,
+                match attitude.frame_of {
+                    AttitudeFrame::Icrs => "ICRS",
+                    AttitudeFrame::Apparent => "apparent, axes of ICRS",
+                }
             ),
         ),
         labelled(

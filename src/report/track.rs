@@ -132,7 +132,10 @@ impl TrackReport {
             reason,
             reason_code,
             not_tracked: track.loss.as_ref().map(not_tracked),
-            attitude: track.attitude.as_ref().map(|found| attitude(found, at)),
+            attitude: track
+                .attitude
+                .as_ref()
+                .map(|found| attitude(track, found, at)),
             rate_deg_s,
             rate_sigma_deg_s,
             rate_deg_frame,
@@ -219,12 +222,15 @@ fn not_tracked(loss: &Loss) -> NotTrackedReport {
     }
 }
 
-fn attitude(found: &Attitude, at: &'static str) -> TrackAttitudeReport {
+fn attitude(track: &Track, found: &Attitude, at: &'static str) -> TrackAttitudeReport {
     let covariance = found.covariance_rad2 * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
     let element =
         |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
+    let seen = track
+        .places
+        .attitude(&found.icrs_to_camera, track.attitude_frame);
     TrackAttitudeReport {
-        attitude: build::attitude(&found.icrs_to_camera, &found.covariance_rad2, at),
+        attitude: build::attitude(&seen, &found.covariance_rad2, (at, track.attitude_frame)),
         covariance_arcsec2: [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column))),
     }
 }
@@ -259,6 +265,7 @@ fn axes(rad: &Vector3<f64>, digits: impl Fn(f64) -> Option<f64>) -> AxesReport {
 mod tests {
     use super::*;
     use crate::base::coords::{Rotation, UnitVector};
+    use crate::sky::places::{AttitudeFrame, StarPlaces};
     use crate::track::Mode;
     use nalgebra::Matrix3;
 
@@ -266,6 +273,8 @@ mod tests {
         Track {
             mode: Mode::Tracked,
             time_s: Some(0.5),
+            places: StarPlaces::default(),
+            attitude_frame: AttitudeFrame::default(),
             attitude: Some(Attitude {
                 icrs_to_camera: Rotation::looking_at(&UnitVector::from_ra_dec(1.0, 0.5), 0.3),
                 covariance_rad2: Matrix3::from_diagonal(&Vector3::new(1e-10, 4e-10, 9e-8)),

@@ -3,8 +3,10 @@
 //!
 //! - [`catalog`]: a catalogue file → stars, brightest first, and search by position.
 //! - [`observer`]: site, date and direction → zenith distance, azimuth and airmass.
+//! - [`places`]: a star, date, site and velocity → where the star appears.
 //! - [`solar_system`]: date and site → the Moon and the planets.
 
 pub mod catalog;
 pub mod observer;
+pub mod places;
 pub mod solar_system;

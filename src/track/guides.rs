@@ -3,6 +3,7 @@
 use crate::base::coords::{Icrs, UnitVector};
 use crate::identify::IndexedCatalog;
 use crate::sky::catalog::StarIndex;
+use crate::sky::places::StarPlaces;
 
 /// Margin around a field, in units of its radius, within which stars are gathered, so that the next
 /// fields have theirs, too.
@@ -18,7 +19,7 @@ const FAINTEST_NEIGHBOR_MAG: f64 = 4.5;
 /// A catalogue star that can be tracked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuideStar {
-    /// Direction at the date of the frames.
+    /// Apparent direction.
     pub direction: UnitVector<Icrs>,
     /// V magnitude.
     pub v_mag: f64,
@@ -35,8 +36,8 @@ pub(super) struct Wanted {
     pub width_rad: f64,
     /// Radius around a star in which there is no other like it, in radians.
     pub clear_rad: f64,
-    /// Date, in Julian years since J2000.0.
-    pub years_since_j2000: f64,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
 }
 
 /// The stars around the present field. They are looked up anew where the field has left them.
@@ -66,7 +67,7 @@ impl GuideRegion {
             && is_alike(a.v_mag[1], b.v_mag[1], NEARLY_MAG)
             && is_alike(a.width_rad, b.width_rad, 0.2 * a.width_rad)
             && is_alike(a.clear_rad, b.clear_rad, 0.2 * a.clear_rad)
-            && a.years_since_j2000 == b.years_since_j2000
+            && a.places == b.places
     }
 }
 
@@ -105,7 +106,7 @@ impl Guides {
         nearby.sort_unstable_by_key(|(index, _)| *index);
         stars.clear();
         for &(index, v_mag) in nearby.iter() {
-            let direction = sky.stars()[index.get()].direction_at(wanted.years_since_j2000);
+            let direction = wanted.places.of(&sky.stars()[index.get()]);
             let star = GuideStar {
                 direction,
                 v_mag,

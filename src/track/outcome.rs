@@ -4,6 +4,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::CameraModel;
 use crate::pipeline::Solution;
 use crate::sky::catalog::StarIndex;
+use crate::sky::places::{AttitudeFrame, StarPlaces};
 use nalgebra::{Matrix3, Vector3};
 
 /// How the attitude of a frame was found.
@@ -31,7 +32,7 @@ impl Mode {
 /// An attitude and its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
-    /// Rotation from the sky to camera axes.
+    /// Rotation from apparent directions, in ICRS axes, to camera axes.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
     /// Covariance of the small rotation about the camera's x, y and z axes, in rad².
     pub covariance_rad2: Matrix3<f64>,
@@ -106,7 +107,7 @@ pub struct TrackedStar {
     pub position: PixelPoint,
     /// Standard error of the centroid on each axis, in pixels.
     pub sigma_px: f64,
-    /// Its direction at the date of the frame.
+    /// Its apparent direction.
     pub direction: UnitVector<Icrs>,
 }
 
@@ -120,6 +121,10 @@ pub struct Track {
     pub time_s: Option<f64>,
     /// The attitude, from this frame alone; `None` where it is lost.
     pub attitude: Option<Attitude>,
+    /// Where stars appear in it: at the time of the last full solution.
+    pub places: StarPlaces,
+    /// Which directions the reported attitude refers to.
+    pub attitude_frame: AttitudeFrame,
     /// The rate, from this frame and those before it; `None` before the second attitude.
     pub rate: Option<AngularRate>,
     /// Stars that the attitude was fitted to.

@@ -19,6 +19,7 @@ use crate::identify::{
 use crate::photometry::instrumental_mag;
 use crate::pipeline::{Context, Outcome, Solution, Workspace, solve_frame};
 use crate::sky::catalog::Catalog;
+use crate::sky::places::{AttitudeFrame, StarPlaces};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// Default number of stars that are tracked.
@@ -70,7 +71,7 @@ struct TrackerState {
     light: StarBrightness,
     /// Time of the last attitude or try, in seconds or frames.
     clock: Clock,
-    years_since_j2000: f64,
+    places: StarPlaces,
     exposure_s: Option<f64>,
     /// Squared error that the stated ones lack, in px²; negative where they are too large.
     excess_variance_px2: f64,
@@ -185,17 +186,13 @@ impl<'a> Tracker<'a> {
         time_s: Option<f64>,
     ) -> Result<Track, DetectError> {
         let clock = self.clock(time_s);
-        match self.track(frame, clock) {
-            Ok(mut track) => {
-                track.time_s = time_s;
-                Ok(track)
-            }
-            Err(loss) => {
-                let mut track = self.solve(frame, clock, loss)?;
-                track.time_s = time_s;
-                Ok(track)
-            }
-        }
+        let mut track = match self.track(frame, clock) {
+            Ok(track) => track,
+            Err(loss) => self.solve(frame, clock, loss)?,
+        };
+        track.time_s = time_s;
+        track.attitude_frame = self.context.attitude_frame;
+        Ok(track)
     }
 
     /// The stars that the attitude of the last tracked frame was fitted to.
@@ -313,6 +310,8 @@ impl<'a> Tracker<'a> {
                 mode: Mode::Lost,
                 time_s: None,
                 attitude: None,
+                places: StarPlaces::default(),
+                attitude_frame: AttitudeFrame::default(),
                 rate: None,
                 stars_used: 0,
                 log10_false_alarm: None,
@@ -343,7 +342,6 @@ impl<'a> Tracker<'a> {
         found: &Identification,
         attitude: &Attitude,
     ) -> TrackerState {
-        let years = solution.date.map_or(0.0, |d| d.date.years_since_j2000());
         let config = self.context.detect_config(frame);
         let saturation_adu = config.saturation_adu(frame, &mut SaturationFinder::default());
         let light = StarBrightness::of(
@@ -369,7 +367,7 @@ impl<'a> Tracker<'a> {
             spot: None,
             light,
             clock,
-            years_since_j2000: years,
+            places: found.places,
             exposure_s: solution.exposure_s,
             excess_variance_px2: found.excess_sigma_px.powi(2),
             frames: 0,
@@ -473,7 +471,7 @@ impl TrackerState {
             v_mag: [brightest.max(-10.0), faintest],
             width_rad: width_px * rad_per_px,
             clear_rad: clear_px * rad_per_px,
-            years_since_j2000: self.years_since_j2000,
+            places: self.places,
         }
     }
 
@@ -501,6 +499,8 @@ impl TrackerState {
             mode,
             time_s: None,
             attitude: Some(attitude),
+            places: self.places,
+            attitude_frame: AttitudeFrame::default(),
             rate: self.motion.rate(self.clock.is_counted),
             stars_used,
             log10_false_alarm: Some(log10),

@@ -4,6 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Protocol, SimulatedCentroids};
 
 fn allocations(work: impl FnOnce()) -> u64 {
@@ -21,7 +22,7 @@ fn fields(sky: &IndexedCatalog) -> Vec<StarField> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut field = SimulatedCentroids::draw(&protocol, sky, &mut random)
             .list
-            .star_field(0.0);
+            .star_field(StarPlaces::default());
         // With a known spot, blends are searched for.
         field.spot_sigma_px = Some(1.5);
         field

@@ -8,6 +8,7 @@ use starpipe::camera::data_sheet::{Preset, template};
 use starpipe::model::sensitivity::{Scenario, SkyBrightness};
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -43,7 +44,7 @@ impl Night {
         let boresight = UnitVector::from_ra_dec(300f64.to_radians(), 35f64.to_radians());
         let pointing = Pointing {
             icrs_to_camera: Rotation::looking_at(&boresight, 0.3),
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
         };
         let stars = Catalog::built_in().stars();
         let simulator = Simulator::new(&scenario, &Scene::default(), stars).unwrap();
@@ -95,8 +96,10 @@ fn with(text: &str, key: &str, value: &str) -> String {
     text.lines().map(line).collect()
 }
 
+/// The notes, but that there is no date.
 fn notes(report: &Value) -> String {
     let notes = report["notes"].as_array().unwrap().iter();
+    let notes = notes.filter(|note| note["code"] != "date_unknown");
     notes
         .map(|note| note["text"].as_str().unwrap().to_owned() + "\n")
         .collect()

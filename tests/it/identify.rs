@@ -11,6 +11,7 @@ use starpipe::identify::{
     Effort, Identification, ObservedStar, Photometry, Priors, ScalePrior, SearchFailure, SkyRegion,
     SourceIndex, StarField, StarMatch, Workspace, identify,
 };
+use starpipe::sky::places::StarPlaces;
 use std::f64::consts::{PI, TAU};
 
 const WIDTH_PX: f64 = 1024.0;
@@ -129,7 +130,7 @@ fn field(mut stars: Vec<ObservedStar>) -> StarField {
         width_px: WIDTH_PX,
         height_px: HEIGHT_PX,
         photometry: Photometry::Instrumental,
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
         spot_sigma_px: None,
         stars,
     }

@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use starpipe::identify::{Priors, identify};
 use starpipe::sky::catalog::StarIndex;
+use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Answer, Mirrored, Protocol, SimulatedCentroids, TrialResult};
 
 fn draw(protocol: &Protocol, seed: u64) -> SimulatedCentroids {
@@ -109,7 +110,7 @@ fn errors_missing_and_false_stars_are_as_requested() {
 #[test]
 fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
     let observation = draw(&Protocol::default(), 3);
-    let field = observation.list.star_field(0.0);
+    let field = observation.list.star_field(StarPlaces::default());
     let found = identify(&field, &Priors::default(), sky());
     let result = TrialResult::new(&observation, found.as_ref().ok(), 0.0);
     assert_eq!(result.answer, Answer::Right);

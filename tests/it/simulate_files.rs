@@ -83,7 +83,7 @@ fn a_frame_says_how_it_was_made_in_fits_and_in_tiff() {
         "EGAIN   =",
         "RDNOISE =",
         "SATURATE=",
-        "CTYPE1  = 'RA---TAN'",
+        "CTYPE1  = 'RA---TAN-SIP'",
         "HISTORY seed = 9, frame 0",
     ] {
         assert!(holds(&content, text), "{text}");

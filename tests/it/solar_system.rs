@@ -6,6 +6,7 @@ use starpipe::identify::{DateSource, FrameDate, IndexedCatalog};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::sky::catalog::{Star, StarId};
+use starpipe::sky::places::StarPlaces;
 use starpipe::sky::solar_system::{Body, BodyKind, TimeError, bodies_at};
 use starpipe::{Context, FrameReport, ObservationDate, Solution, Workspace, solve_frame};
 
@@ -60,7 +61,6 @@ fn solved(
     known: Option<&str>,
 ) -> Solution {
     let date: ObservationDate = date.parse().unwrap();
-    let years = date.years_since_j2000();
     let v_mag = of(kind, &date).v_mag;
     let mut stars = sky.catalog().stars().to_vec();
     stars.push(Star::new(StarId::Number(1), direction(place), v_mag as f32));
@@ -69,7 +69,7 @@ fn solved(
     let centre = direction([place[0] + 2.0, place[1] - 1.5]);
     let pointing = Pointing {
         icrs_to_camera: Rotation::looking_at(&centre, 0.3),
-        years_since_j2000: years,
+        places: StarPlaces::at(&date, None, None),
     };
     let (frame, _) = simulator.frame(&pointing, 7).unwrap();
     let mut context = Context::new(sky);

@@ -1,12 +1,13 @@
 //! Hints: what is known of the frames in advance.
 
+use super::observer::ObserverOptions;
 use super::values;
 use crate::cli::exit::CommandError;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use starpipe::base::epoch::ObservationDate;
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::pipeline::SolveOptions;
-use starpipe::sky::observer::Site;
+use starpipe::sky::places::AttitudeFrame;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -29,18 +30,37 @@ pub(crate) struct HintOptions {
     #[arg(long, value_name = "DEG", value_parser = values::radius, allow_hyphen_values = true,
           requires = "near")]
     pub(crate) radius: Option<f64>,
-    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper
-    /// motion [default: of frames, the date in the file's header, else in its name; else 2000]
+    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper motion
+    /// and aberration [default: of frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
-    /// Where they were taken: latitude and longitude (north and east positive) in degrees, and
-    /// height in metres; with the date, gives zenith distance and airmass
-    #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
-    pub(crate) site: Option<Site>,
+    #[command(flatten)]
+    observer: ObserverOptions,
+    /// Which directions the attitude refers to
+    #[arg(long, value_name = "DIRECTIONS", value_enum, default_value_t = FrameOf::Icrs)]
+    frame_of: FrameOf,
     /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and
     /// a predicted limiting magnitude for frames whose exposure is known
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
+}
+
+/// Which directions an attitude refers to.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FrameOf {
+    /// Those of the catalogue at the date: coordinates of what is in the centre
+    Icrs,
+    /// Those from which light reaches the camera: how the camera itself is turned
+    Apparent,
+}
+
+impl From<FrameOf> for AttitudeFrame {
+    fn from(frame: FrameOf) -> Self {
+        match frame {
+            FrameOf::Icrs => Self::Icrs,
+            FrameOf::Apparent => Self::Apparent,
+        }
+    }
 }
 
 impl HintOptions {
@@ -56,7 +76,9 @@ impl HintOptions {
         options.pixel_scale_arcsec = self.pixel_scale;
         options.near_deg = self.near.map(|near| [near.ra_deg, near.dec_deg]);
         options.date = self.date;
-        options.site = self.site;
+        options.attitude_frame = self.frame_of.into();
+        options.site = self.observer.site();
+        options.velocity_km_s = self.observer.velocity_km_s();
         set(&mut options.scale_error_percent, self.scale_error);
         set(&mut options.radius_deg, self.radius);
         Ok(options)

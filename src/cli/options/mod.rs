@@ -4,6 +4,7 @@ pub(crate) mod catalog;
 pub(crate) mod format;
 pub(crate) mod frames;
 pub(crate) mod hints;
+pub(crate) mod observer;
 pub(crate) mod parameters;
 pub(crate) mod scenario;
 pub(crate) mod setup;

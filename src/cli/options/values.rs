@@ -1,6 +1,7 @@
 //! Parsers of option values, which refuse values out of range.
 
 use starpipe::base::angle::Angle;
+use starpipe::sky::observer::Air;
 use std::fmt::Display;
 
 /// Largest side of a frame, in pixels.
@@ -179,6 +180,40 @@ pub(crate) fn direction(text: &str) -> Result<Direction, String> {
         ra_deg: right_ascension(ra)?,
         dec_deg: declination(dec)?,
     })
+}
+
+/// Pressure in hPa and temperature in °C.
+pub(crate) fn air(text: &str) -> Result<Air, String> {
+    let (pressure, temperature) = text
+        .split_once(',')
+        .ok_or("expected pressure and temperature, separated by a comma")?;
+    let pressure_hpa = within(
+        pressure,
+        "the pressure",
+        |v| (0.0..=1200.0).contains(&v),
+        "from 0 to 1200 hPa",
+    )?;
+    let temperature_c = within(
+        temperature,
+        "the temperature",
+        |v| (-100.0..=70.0).contains(&v),
+        "from -100 to 70 °C",
+    )?;
+    Ok(Air::new(pressure_hpa, temperature_c))
+}
+
+/// A velocity in km/s, along three axes.
+pub(crate) fn velocity(text: &str) -> Result<[f64; 3], String> {
+    /// A tenth of the speed of light.
+    const MAX_KM_S: f64 = 3e4;
+    let along: Vec<f64> = text.split(',').map(finite).collect::<Result<_, _>>()?;
+    let km_s: [f64; 3] = along
+        .try_into()
+        .map_err(|_| "expected three numbers, separated by commas".to_owned())?;
+    let is_slow = km_s.iter().all(|along| along.abs() <= MAX_KM_S);
+    is_slow
+        .then_some(km_s)
+        .ok_or_else(|| format!("the velocity must be at most {MAX_KM_S} km/s along each axis"))
 }
 
 pub(crate) fn not_of_form(text: &str, form: &str) -> String {

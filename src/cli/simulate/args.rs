@@ -2,6 +2,7 @@
 
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
+use crate::cli::options::observer::ObserverOptions;
 use crate::cli::options::setup::SetupOptions;
 use crate::cli::options::values;
 use clap::{ArgGroup, Args, ValueEnum};
@@ -17,7 +18,8 @@ use std::path::PathBuf;
     starpipe simulate --camera camera.toml --stars list.csv --out field.fits\n\n\
     Each frame has a table of what is on it, FRAME.csv: stars with their positions, magnitudes and electrons, false\n\
     stars, trails, cosmic rays. The header of a FITS file or the description of a TIFF file lists all parameters.\n\
-    Frame N of --random-attitude is frame N of `starpipe validate` with the same options and seed.")]
+    With --date 2000-01-01T12:00:00Z, frame N of --random-attitude is frame N of `starpipe validate` with the
+    same options and seed.")]
 #[command(group = ArgGroup::new("subject").args(["ra", "random_attitude", "stars", "dark", "flat"]).required(true))]
 pub(crate) struct SimulateArgs {
     /// Right ascension of the frame's centre, in degrees
@@ -42,9 +44,12 @@ pub(crate) struct SimulateArgs {
     /// Simulate flat fields: the same light on each pixel, in electrons
     #[arg(long, value_name = "ELECTRONS", value_parser = values::not_negative)]
     pub(super) flat: Option<f64>,
-    /// Date of the frames, as ISO 8601, for proper motion [default: 2000]
+    /// Date of the frames, as ISO 8601, for proper motion and aberration [default: 2000, without
+    /// aberration]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(super) date: Option<ObservationDate>,
+    #[command(flatten)]
+    pub(super) observer: ObserverOptions,
     /// Number of frames
     #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub(super) count: u64,

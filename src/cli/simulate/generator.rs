@@ -6,6 +6,8 @@ use starpipe::base::epoch::ObservationDate;
 use starpipe::frame::{Frame, FrameError, FrameMetadata};
 use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::observer::Site;
+use starpipe::sky::places::StarPlaces;
 use starpipe::study::validation::draw;
 
 /// Simulates frames of one subject with one camera.
@@ -15,6 +17,9 @@ pub(super) struct Generator<'a> {
     pub(super) subject: &'a Subject,
     pub(super) catalog: &'a Catalog,
     pub(super) date: Option<ObservationDate>,
+    pub(super) site: Option<Site>,
+    /// Where the catalogue's stars appear.
+    pub(super) places: StarPlaces,
     pub(super) seed: u64,
     pub(super) limit_vmag: f64,
 }
@@ -23,9 +28,21 @@ pub(super) struct Generator<'a> {
 pub(super) struct Simulated {
     pub(super) frame: Frame<'static>,
     pub(super) truth: Option<Truth>,
-    pub(super) attitude: Option<Rotation<Icrs, Camera>>,
+    pub(super) pointing: Option<Pointing>,
     pub(super) number: u64,
     pub(super) seed: u64,
+}
+
+impl Simulated {
+    /// The attitude relative to the directions of the catalogue.
+    pub(super) fn attitude(&self) -> Option<Rotation<Icrs, Camera>> {
+        let pointing = self.pointing.as_ref()?;
+        Some(
+            pointing
+                .places
+                .astrometric_attitude(&pointing.icrs_to_camera),
+        )
+    }
 }
 
 impl Generator<'_> {
@@ -33,15 +50,14 @@ impl Generator<'_> {
     pub(super) fn frame(&self, number: u64) -> Result<Simulated, FrameError> {
         let (seed, drawn) = draw(self.seed, number);
         let simulator = self.simulator;
-        let (mut frame, truth, attitude) = match self.subject {
+        let (mut frame, truth, pointing) = match self.subject {
             Subject::Sky(fixed) => {
-                let icrs_to_camera = fixed.unwrap_or(drawn);
                 let pointing = Pointing {
-                    icrs_to_camera,
-                    years_since_j2000: self.date.map_or(0.0, |date| date.years_since_j2000()),
+                    icrs_to_camera: self.places.apparent_attitude(&fixed.unwrap_or(drawn)),
+                    places: self.places,
                 };
                 let (frame, truth) = simulator.frame(&pointing, seed)?;
-                (frame, Some(truth), Some(icrs_to_camera))
+                (frame, Some(truth), Some(pointing))
             }
             Subject::Stars(stars) => {
                 let (frame, truth) = simulator.star_field(stars, seed)?;
@@ -54,7 +70,7 @@ impl Generator<'_> {
         Ok(Simulated {
             frame,
             truth,
-            attitude,
+            pointing,
             number,
             seed,
         })
@@ -65,6 +81,7 @@ impl Generator<'_> {
         let sheet = &self.setup.scenario.camera;
         let mut metadata = FrameMetadata::default();
         metadata.date = self.date;
+        metadata.site = self.site;
         metadata.exposure_s = Some(self.setup.scenario.conditions.exposure_s);
         metadata.pixel_size_um = Some((sheet.pitch_x_um * sheet.pitch_y_um).sqrt());
         metadata.focal_length_mm = Some(sheet.focal_length_mm);

@@ -3,6 +3,7 @@
 use super::generator::{Generator, Simulated};
 use super::subject::Subject;
 use starpipe::frame::{FitsHeader, RowOrder};
+use starpipe::identify::SkyView;
 use starpipe::model::sensitivity::Reading;
 use starpipe::model::simulate::SetupParameter;
 use starpipe::report::wcs;
@@ -45,13 +46,13 @@ impl Description<'_> {
         let saturation_adu = self.simulated.frame.saturation_adu.map_or(0.0, f64::from);
         header.real("SATURATE", saturation_adu, "[adu]");
         header.integer("BITS", i64::from(sheet.bits), "of a grey level");
-        if let Some(icrs_to_camera) = &self.simulated.attitude {
-            wcs::add_projection(
-                &mut header,
-                self.generator.simulator.camera(),
-                icrs_to_camera,
-                RowOrder::TopDown,
-            );
+        if let Some(pointing) = &self.simulated.pointing {
+            let view = SkyView {
+                camera: self.generator.simulator.camera(),
+                icrs_to_camera: &pointing.icrs_to_camera,
+                places: pointing.places,
+            };
+            wcs::add_projection(&mut header, &view, RowOrder::TopDown);
         }
         for line in self.lines() {
             header.history(&line);
@@ -90,7 +91,7 @@ impl Description<'_> {
         if let Subject::Flat(electrons) = self.generator.subject {
             lines.push(format!("flat_e = {electrons}"));
         }
-        if let Some(icrs_to_camera) = &self.simulated.attitude {
+        if let Some(icrs_to_camera) = self.simulated.attitude() {
             let [w, x, y, z] = icrs_to_camera.to_quaternion();
             lines.push(format!("quaternion = {w:.9} {x:.9} {y:.9} {z:.9}"));
         }

@@ -22,6 +22,7 @@ use header::Description;
 use record::FrameRecord;
 use starpipe::model::sensitivity::{Budget, Detector, Rule};
 use starpipe::model::simulate::{Simulator, truth_table};
+use starpipe::sky::places::StarPlaces;
 use std::ops::ControlFlow;
 use subject::Subject;
 
@@ -36,12 +37,18 @@ pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Outcome, CommandError
         .context("simulating a frame")?;
     let uniform = simulator.uniform_scenario();
     let detector = Detector::new(Rule::MatchedFilter, &uniform, &Budget::new(&uniform));
+    let site = arguments.observer.site();
+    let velocity_km_s = arguments.observer.velocity_km_s();
     let generator = Generator {
         setup: &setup,
         simulator: &simulator,
         subject: &subject,
         catalog: &catalog,
         date: arguments.date,
+        site,
+        places: arguments.date.map_or_else(StarPlaces::default, |date| {
+            StarPlaces::at(&date, site, velocity_km_s.map(Into::into))
+        }),
         seed: arguments.seed,
         limit_vmag: detector.vmag_at(0.5),
     };
@@ -100,8 +107,8 @@ fn write(generator: &Generator, files: &FrameFiles, number: u64) -> anyhow::Resu
     let record = FrameRecord::new(generator, &simulated, &path, truth_path.as_deref());
     let mut contents = vec![(path, image)];
     if let (Some(truth), Some(path)) = (&simulated.truth, truth_path) {
-        let (camera, attitude) = (generator.simulator.camera(), simulated.attitude.as_ref());
-        let rows = truth_table(truth, camera, generator.catalog, attitude);
+        let (camera, pointing) = (generator.simulator.camera(), simulated.pointing.as_ref());
+        let rows = truth_table(truth, camera, generator.catalog, pointing);
         contents.push((path, csv_table(rows.into_iter())?.into_bytes()));
     }
     write_whole(&contents)?;

@@ -58,7 +58,7 @@ impl FrameRecord {
             height: simulated.frame.height,
             exposure_s: generator.setup.scenario.conditions.exposure_s,
             date: generator.date.map(|date| date.to_iso()),
-            attitude: simulated.attitude.as_ref().map(AttitudeRecord::of),
+            attitude: simulated.attitude().as_ref().map(AttitudeRecord::of),
             focal_length_px: camera.central_focal_length_px(),
             fov_x_deg: camera.fov_x_rad().map(|fov_rad| fov_rad * DEG_PER_RAD),
             mirrored: camera.mirrored,

@@ -24,6 +24,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
     let protocol = Protocol {
         setup: arguments.setup.setup()?,
         scale_known: !arguments.scale_unknown,
+        site: None,
         seed: arguments.seed,
     };
     let study_runs = study::runs(&arguments.sweep, &protocol)?;

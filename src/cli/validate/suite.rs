@@ -16,10 +16,7 @@ pub(super) fn run(
 ) -> Result<Vec<HardRow>, CommandError> {
     let mut rows = Vec::new();
     for case in &HARD_SUITE {
-        let protocol = Protocol {
-            setup: case.setup(&base.setup),
-            ..base.clone()
-        };
+        let protocol = case.protocol(base);
         let check = protocol.setup.check();
         check.map_err(|error| CommandError::Usage(format!("{}: {error}", case.name)))?;
         let summary = run::run(&directory.join(case.name), &protocol, shared)?;

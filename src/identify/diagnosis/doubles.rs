@@ -133,6 +133,7 @@ mod tests {
     use super::*;
     use crate::base::coords::PixelPoint;
     use crate::identify::{ObservedStar, Photometry, SourceIndex};
+    use crate::sky::places::StarPlaces;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -150,7 +151,7 @@ mod tests {
             width_px: 500.0,
             height_px: 500.0,
             photometry: Photometry::Instrumental,
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
             spot_sigma_px: None,
             stars,
         }

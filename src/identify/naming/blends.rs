@@ -268,7 +268,7 @@ impl BlendView<'_> {
     /// A star's position in the frame, and its flux in units of that of a star of `unit_v_mag`.
     fn light_of(&self, index: StarIndex, unit_v_mag: f32) -> Option<(PixelPoint, f64)> {
         let star = self.problem.sky.catalog().star(index);
-        let direction = star.direction_at(self.problem.field.years_since_j2000);
+        let direction = self.problem.field.places.of(star);
         let in_camera = self.hypothesis.icrs_to_camera.apply(&direction);
         let pixel = self.hypothesis.camera.pixel_of(&in_camera)?;
         Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))

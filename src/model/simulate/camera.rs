@@ -4,14 +4,15 @@ use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
 use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
+use crate::sky::places::StarPlaces;
 
-/// Attitude and date of a frame.
+/// Attitude of a frame, and where stars appear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pointing {
-    /// Attitude in the middle of the exposure.
+    /// Attitude in the middle of the exposure, relative to apparent directions.
     pub icrs_to_camera: Rotation<Icrs, Camera>,
-    /// Date in Julian years since J2000.0, for proper motion.
-    pub years_since_j2000: f64,
+    /// Where the catalogue's stars appear.
+    pub places: StarPlaces,
 }
 
 /// The camera model of a data sheet, with square pixels of the same area, and the distortion of its

@@ -51,7 +51,7 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
 /// let simulator = Simulator::new(&setup.scenario, &setup.scene, stars)?;
 /// let pointing = Pointing {
 ///     icrs_to_camera: Rotation::looking_at(&UnitVector::from_ra_dec(1.46, -0.02), 0.0),
-///     years_since_j2000: 26.0,
+///     places: StarPlaces::of_catalog(26.0),
 /// };
 /// let (frame, truth) = simulator.frame(&pointing, 1)?;
 /// assert_eq!((frame.width, frame.height), (320, 240));

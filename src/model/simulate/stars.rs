@@ -47,20 +47,19 @@ impl StarSampler<'_> {
         reach_px: f64,
         random: &mut ChaCha8Rng,
     ) -> Vec<TrueStar> {
-        /// Largest proper motion between J2000.0 and any requested date: Barnard's Star in 200
-        /// years.
-        const PROPER_MOTION_ROOM_RAD: f64 = 0.01;
+        /// Largest shift of a place: Barnard's Star in 200 years, and refraction at the horizon.
+        const SHIFT_ROOM_RAD: f64 = 0.02;
         let boresight = pointing
             .icrs_to_camera
             .inverse()
             .apply(&UnitVector::BORESIGHT);
-        // Margin for light from outside, and for proper motion.
-        let margin_rad = 2.0 * reach_px / self.camera.focal_length_px() + PROPER_MOTION_ROOM_RAD;
+        // Margin for light from outside, and for apparent places.
+        let margin_rad = 2.0 * reach_px / self.camera.focal_length_px() + SHIFT_ROOM_RAD;
         let least_cosine = libm::cos((self.camera.radius_rad() + margin_rad).min(PI));
         let is_near = |star: &Star| star.direction.dot(&boresight) > least_cosine;
         let near = stars.iter().enumerate().filter(|(_, star)| is_near(star));
         near.filter_map(|(catalog, star)| {
-            let direction = star.direction_at(pointing.years_since_j2000);
+            let direction = pointing.places.of(star);
             let direction = pointing.icrs_to_camera.apply(&direction);
             let position = self.camera.pixel_of(&direction)?;
             if !self.camera.nearly_contains(&position, reach_px) {

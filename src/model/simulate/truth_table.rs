@@ -1,7 +1,8 @@
 //! The table of what is on a simulated frame.
 
+use super::camera::Pointing;
 use super::truth::{TrueStar, Truth};
-use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::base::coords::PixelPoint;
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::CameraModel;
 use crate::sky::catalog::Catalog;
@@ -36,24 +37,25 @@ pub struct TruthRow {
     pub on_frame: bool,
 }
 
-/// What is on a frame of `camera`, brightest stars first. Without attitude the stars are those of a
-/// list, and `catalog` is not used.
+/// What is on a frame of `camera`, brightest stars first. Without pointing the stars are those of a
+/// list, and `catalog` is not used. Directions are those of the catalogue at the date.
 pub fn truth_table(
     truth: &Truth,
     camera: &CameraModel,
     catalog: &Catalog,
-    attitude: Option<&Rotation<Icrs, Camera>>,
+    pointing: Option<&Pointing>,
 ) -> Vec<TruthRow> {
     let star = |star: &TrueStar| {
         let known = star.catalog.map(|index| catalog.star(index));
-        let sky = attitude.and_then(|icrs_to_camera| {
+        let sky = pointing.and_then(|pointing| {
             let direction = camera.direction_of(&star.position)?;
-            let (ra_rad, dec_rad) = icrs_to_camera.inverse().apply(&direction).to_ra_dec();
+            let apparent = pointing.icrs_to_camera.inverse().apply(&direction);
+            let (ra_rad, dec_rad) = pointing.places.astrometric(&apparent).to_ra_dec();
             Some([ra_rad, dec_rad].map(|rad| decimals(rad * DEG_PER_RAD, 8)))
         });
         TruthRow {
             // Of a list, no star is false.
-            kind: if known.is_some() || attitude.is_none() {
+            kind: if known.is_some() || pointing.is_none() {
                 "star"
             } else {
                 "false_star"

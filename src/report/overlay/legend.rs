@@ -9,6 +9,7 @@ use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::CameraModel;
 use crate::identify::Identification;
 use crate::pipeline::Solution;
+use crate::sky::places::AttitudeFrame;
 
 // Lengths are in units of strokes.
 
@@ -97,7 +98,7 @@ fn field_line(solution: &Solution) -> String {
     let Some(found) = solution.outcome.identification() else {
         return "not identified".to_owned();
     };
-    let (boresight, _) = found.icrs_to_camera.boresight_and_up();
+    let (boresight, _) = found.attitude(AttitudeFrame::Icrs).boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
     format!(
         "RA {}  Dec {} · {}",

@@ -10,6 +10,7 @@ use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
 use crate::pipeline::{Background, Measured, Outcome, Reason, Source};
 use crate::report::sample;
 use crate::sky::catalog::StarIndex;
+use crate::sky::places::StarPlaces;
 use nalgebra::Matrix3;
 
 const WIDTH: usize = 900;
@@ -58,6 +59,7 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
 fn identified(up_deg: f64, mirrored: bool) -> Outcome {
     let boresight = UnitVector::from_ra_dec(80.0 * RAD_PER_DEG, 30.0 * RAD_PER_DEG);
     Outcome::Identified(Box::new(Identification {
+        places: StarPlaces::default(),
         camera: CameraModel::pinhole(WIDTH as f64, HEIGHT as f64, 3000.0, mirrored),
         icrs_to_camera: Rotation::looking_at(&boresight, up_deg * RAD_PER_DEG),
         attitude_covariance_rad2: Matrix3::identity() * 1e-10,

@@ -20,8 +20,9 @@ use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
 use crate::frame::{FitsHeader, RowOrder};
-use crate::identify::Identification;
+use crate::identify::{Identification, SkyView};
 use crate::pipeline::{Outcome, Solution};
+use crate::sky::places::AttitudeFrame;
 use memchr::memmem;
 use nalgebra::{Matrix2, RowVector2, Vector3};
 use plane::Plane;
@@ -62,12 +63,12 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     let row_order = solution.row_order.unwrap_or_default();
     let order = row_order.keyword_value();
     header.text("ROWORDER", order, "of the image's file");
-    add_projection(
-        &mut header,
-        &identification.camera,
-        &identification.icrs_to_camera,
-        row_order,
-    );
+    let view = SkyView {
+        camera: &identification.camera,
+        icrs_to_camera: &identification.icrs_to_camera,
+        places: identification.places,
+    };
+    add_projection(&mut header, &view, row_order);
     add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
         let utc = known.date.to_iso();
@@ -84,22 +85,22 @@ pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
-/// Adds the mapping from a file's pixels to the sky, for a `camera` in this attitude.
+/// Adds the mapping from a file's pixels to the directions of the catalogue.
 #[doc(hidden)]
-pub fn add_projection(
-    header: &mut FitsHeader,
-    camera: &CameraModel,
-    icrs_to_camera: &Rotation<Icrs, Camera>,
-    row_order: RowOrder,
-) {
+pub fn add_projection(header: &mut FitsHeader, view: &SkyView, row_order: RowOrder) {
+    let SkyView { camera, places, .. } = view;
+    let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
     let plane = Plane::of(camera);
     let reference = if camera.is_pinhole() {
         camera.centre()
     } else {
         camera.axis()
     };
-    let is_plain = camera.is_pinhole() && camera.distortion().is_none();
-    let place = |direction: &UnitVector<Camera>| plane.place_of(direction);
+    let is_plain = camera.is_pinhole() && camera.distortion().is_none() && places.are_of_catalog();
+    let place = |direction: &UnitVector<Camera>| {
+        let apparent = view.icrs_to_camera.inverse().apply(direction);
+        plane.place_of(&icrs_to_camera.apply(&places.astrometric(&apparent)))
+    };
     let sip = (!is_plain)
         .then(|| Sip::new(camera, &reference, place))
         .flatten();
@@ -146,7 +147,7 @@ pub fn add_projection(
 }
 
 fn add_errors(header: &mut FitsHeader, identification: &Identification) {
-    let (east, north) = sky_axes(&identification.icrs_to_camera);
+    let (east, north) = sky_axes(&identification.attitude(AttitudeFrame::Icrs));
     let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
     // A rotation about x moves the boresight along y, and one about y along x.
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {

@@ -6,6 +6,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{Distortion, DistortionModel};
 use crate::report::sample;
+use crate::sky::places::StarPlaces;
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::HashMap;
@@ -92,6 +93,7 @@ impl Wcs {
 
 fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
     let identification = Identification {
+        places: StarPlaces::default(),
         camera,
         icrs_to_camera: attitude,
         attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),

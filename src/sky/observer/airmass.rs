@@ -1,9 +1,6 @@
-//! Airmass and refraction as functions of the zenith distance.
-//!
-//! Caveat: refraction is that of a mean atmosphere; real refraction differs by a few per cent, near
-//! the horizon by minutes of arc.
+//! Airmass as a function of the zenith distance.
 
-use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
+use crate::base::units::DEG_PER_RAD;
 use std::f64::consts::FRAC_PI_2;
 
 /// The airmass at an apparent zenith distance in radians, clamped to 0 to π/2: 0.9997 at the
@@ -34,36 +31,10 @@ pub fn airmass_krisciunas_schaefer(zenith_distance_rad: f64) -> f64 {
     (1.0 - 0.96 * sine * sine).sqrt().recip()
 }
 
-/// The air pressure at a height in metres, relative to sea level: the troposphere of the 1976 US
-/// Standard Atmosphere, extrapolated upwards until it reaches 0.
-///
-/// # Reference
-/// U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), eq. 33a.
-fn relative_pressure(height_m: f64) -> f64 {
-    (1.0 - 2.255_77e-5 * height_m).max(0.0).powf(5.255_88)
-}
-
-/// Refraction in radians at a true altitude in radians, from a height in metres, at 10 °C.
-///
-/// # Reference
-/// Sæmundsson 1986, Sky & Telescope 72, 70, as in Meeus 1998, Astronomical Algorithms, eq. 16.4.
-/// Within 0.1′ of tables.
-pub(super) fn refraction_rad(true_altitude_rad: f64, height_m: f64) -> f64 {
-    /// The formula does not hold below this altitude.
-    const LOWEST_DEG: f64 = -2.0;
-    /// The pressure that the formula assumes, relative to sea level.
-    const PRESSURE: f64 = 1010.0 / 1013.25;
-    const ARCMIN_RAD: f64 = 60.0 * RAD_PER_ARCSEC;
-    let altitude_deg = (true_altitude_rad * DEG_PER_RAD).max(LOWEST_DEG);
-    let bent_deg = altitude_deg + 10.3 / (altitude_deg + 5.11);
-    let arcmin = 1.02 / (bent_deg * RAD_PER_DEG).tan();
-    // At the zenith the formula gives −0.1″.
-    arcmin.max(0.0) * ARCMIN_RAD * relative_pressure(height_m) / PRESSURE
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::units::RAD_PER_DEG;
 
     /// Pickering 2002, by apparent altitude in degrees.
     fn pickering(altitude_deg: f64) -> f64 {
@@ -111,19 +82,5 @@ mod tests {
         }
         let plane = airmass_plane_parallel(60.0 * RAD_PER_DEG);
         assert!((plane - 2.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn refraction_is_that_of_the_tables_and_less_in_thin_air() {
-        // True altitude and refraction in minutes of arc: Meeus 1998, chapter 16.
-        for (altitude_deg, expected_arcmin) in [(0.5541, 24.618), (90.0, 0.0), (45.0, 1.0)] {
-            let found = refraction_rad(altitude_deg * RAD_PER_DEG, 0.0) / (60.0 * RAD_PER_ARCSEC);
-            assert!(
-                (found - expected_arcmin).abs() < 0.12,
-                "{altitude_deg}: {found}"
-            );
-        }
-        let at = |height_m| refraction_rad(0.3, height_m);
-        assert!(at(3000.0) < 0.72 * at(0.0) && at(60_000.0) == 0.0);
     }
 }

@@ -2,17 +2,19 @@
 //!
 //! ([`Site`], [`ObservationDate`] with its time, ICRS direction at the date) → [`Observation`]
 //!
-//! 1. Precession, nutation and annual aberration transform the direction to the true equator of the
-//!    date, and sidereal time to axes fixed to the Earth.
+//! 1. Annual aberration, precession, nutation and sidereal time transform the direction to axes fixed
+//!    to the Earth.
 //! 2. The site's geodetic zenith gives the true (unrefracted) zenith distance and the azimuth.
-//! 3. Mean refraction gives the apparent zenith distance, and that gives the airmass.
+//! 3. Refraction by the site's [`Air`] gives the apparent zenith distance, and that gives the airmass.
 //!
 //! Caveats: UT1 is assumed equal to UTC, which shifts the sky by up to 13″ east or west. All other
-//! approximations are below 1″ (tested against astropy). Refraction is that of a mean atmosphere at
-//! the site's height.
+//! approximations are below 1″ (tested against astropy).
 
 pub(crate) mod airmass;
 mod earth;
+mod refraction;
+
+pub use refraction::Air;
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
@@ -21,12 +23,27 @@ use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::str::FromStr;
 
-/// An observing site on the Earth.
+/// An observing site on the Earth, and its air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
     lat_deg: f64,
     lon_deg: f64,
     height_m: f64,
+    air: Air,
+}
+
+/// Where a site is at a moment, and how it moves, in ICRS axes from the Earth's centre.
+pub(crate) struct SiteInSpace {
+    pub place_km: Vector3<f64>,
+    /// By the Earth's rotation.
+    pub velocity_km_s: Vector3<f64>,
+    pub zenith: UnitVector<Icrs>,
+}
+
+/// The velocity of the Earth's centre relative to the solar system's barycentre, in ICRS axes, in units
+/// of the speed of light, `years` Julian years after J2000.0.
+pub(crate) fn earth_velocity_c(years: f64) -> Vector3<f64> {
+    earth::velocity_c(years)
 }
 
 /// Why a text or numbers are not a site.
@@ -56,7 +73,7 @@ pub enum SiteError {
 
 impl Site {
     /// The site at a geodetic latitude (north positive) and longitude (east positive) in degrees,
-    /// and a height above the ellipsoid in metres.
+    /// and a height above the ellipsoid in metres, with the air of the standard atmosphere.
     ///
     /// # Errors
     /// [`SiteError::OutOfRange`] if the latitude is not within ±90°, the longitude not from −180°
@@ -92,7 +109,19 @@ impl Site {
             lat_deg,
             lon_deg: lon_deg - turn_deg,
             height_m,
+            air: Air::at_height(height_m),
         })
+    }
+
+    /// The same site with this air.
+    #[must_use]
+    pub fn with_air(self, air: Air) -> Self {
+        Self { air, ..self }
+    }
+
+    /// The air.
+    pub fn air(&self) -> Air {
+        self.air
     }
 
     /// Geodetic latitude in degrees, north positive.
@@ -110,24 +139,30 @@ impl Site {
         self.height_m
     }
 
-    /// From the Earth's centre to the site, in ICRS axes, in kilometres, `years` Julian years after
-    /// J2000.0.
-    pub(crate) fn geocentric_icrs_km(&self, years: f64) -> Vector3<f64> {
+    /// Where the site is `years` Julian years after J2000.0.
+    pub(crate) fn in_space(&self, years: f64) -> SiteInSpace {
         // WGS 84.
         const EQUATORIAL_RADIUS_KM: f64 = 6_378.137;
         const FLATTENING: f64 = 1.0 / 298.257_223_563;
         const POLAR_SHARE: f64 = (1.0 - FLATTENING) * (1.0 - FLATTENING);
+        const ROTATION_RAD_S: f64 = 7.292_115e-5;
         let [_, _, up] = self.north_east_up();
         let sin_lat = up.z;
         let normal_km =
             EQUATORIAL_RADIUS_KM / (1.0 - (1.0 - POLAR_SHARE) * sin_lat * sin_lat).sqrt();
         let height_km = self.height_m / 1000.0;
-        let terrestrial = Vector3::new(
+        let terrestrial_km = Vector3::new(
             (normal_km + height_km) * up.x,
             (normal_km + height_km) * up.y,
             (normal_km * POLAR_SHARE + height_km) * up.z,
         );
-        earth::icrs(&terrestrial, years)
+        let to_terrestrial = earth::icrs_to_terrestrial(years);
+        let velocity_km_s = (ROTATION_RAD_S * Vector3::z()).cross(&terrestrial_km);
+        SiteInSpace {
+            place_km: to_terrestrial.tr_mul(&terrestrial_km),
+            velocity_km_s: to_terrestrial.tr_mul(&velocity_km_s),
+            zenith: UnitVector::from_vector(to_terrestrial.tr_mul(&up)),
+        }
     }
 
     /// The unit vectors towards north, east and the zenith, in axes fixed to the Earth.
@@ -182,8 +217,8 @@ pub struct Apparent {
 }
 
 impl Observation {
-    /// The place of `direction` (at the date's epoch) in the sky of `site` at `date`; `None` if
-    /// only the day is known.
+    /// The place of `direction` (of the catalogue, with proper motion to the date) in the sky of `site`
+    /// at `date`; `None` if only the day is known.
     ///
     /// ```
     /// use starpipe::base::coords::UnitVector;
@@ -201,10 +236,13 @@ impl Observation {
         if !date.has_time() {
             return None;
         }
-        let terrestrial = earth::terrestrial(direction, date.years_since_j2000());
+        let years = date.years_since_j2000();
+        let seen = direction.as_vector() + earth::velocity_c(years);
+        let terrestrial = earth::icrs_to_terrestrial(years) * seen.normalize();
         let [north, east, up] = site.north_east_up().map(|axis| axis.dot(&terrestrial));
         let altitude_rad = up.atan2(north.hypot(east));
-        let apparent_rad = altitude_rad + airmass::refraction_rad(altitude_rad, site.height_m);
+        let (sine, cosine) = (libm::cos(altitude_rad), libm::sin(altitude_rad));
+        let apparent_rad = altitude_rad + site.air.refraction_per_sine(cosine) * sine;
         let zenith_distance_rad = (FRAC_PI_2 - apparent_rad).max(0.0);
         let apparent = (apparent_rad >= 0.0).then(|| Apparent {
             zenith_distance_rad,

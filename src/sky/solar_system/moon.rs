@@ -19,7 +19,7 @@ pub(super) fn apparent_au(days_tt: f64, years: f64, site: Option<Site>) -> Vecto
     // Its elements include the light's travel.
     let [moon_au, _] = moon98(J2000_JD, days_tt);
     let observer_au = site.map_or(Vector3::zeros(), |site| {
-        site.geocentric_icrs_km(years) / KM_PER_AU
+        site.in_space(years).place_km / KM_PER_AU
     });
     Vector3::from(moon_au) - observer_au
 }

@@ -8,6 +8,7 @@ use crate::frame::{Frame, FrameError, FrameMetadata};
 use crate::identify::IndexedCatalog;
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario, ScenarioError};
 use crate::model::simulate::{Pointing, Setup, Simulator, TrueStar, Truth};
+use crate::sky::places::StarPlaces;
 use crate::study::robustness::random_rotation;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -92,7 +93,7 @@ impl<'a> FrameMaker<'a> {
         }
         let pointing = Pointing {
             icrs_to_camera: random_rotation(&mut random),
-            years_since_j2000: 0.0,
+            places: StarPlaces::default(),
         };
         let (mut frame, mut truth) = self.simulator.frame(&pointing, random.random())?;
         // It would tell the scale.

@@ -105,7 +105,7 @@ pub fn run(
         ],
         pointing: &Pointing {
             icrs_to_camera: found.icrs_to_camera,
-            years_since_j2000: published.date.years_since_j2000(),
+            places: found.places,
         },
         context: &context,
         seed: trials.seed,

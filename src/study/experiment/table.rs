@@ -8,6 +8,7 @@ use crate::identify::{Identification, Photometry, SourceIndex};
 use crate::model::sensitivity::{Budget, Scenario};
 use crate::pipeline::{CentroidList, ListedCentroid, Solution};
 use crate::sky::catalog::{Catalog, StarId, StarIndex};
+use crate::sky::places::AttitudeFrame;
 use serde::Serialize;
 
 /// The result of the paper's table.
@@ -127,7 +128,7 @@ impl FieldReport {
         let among = stars_among(published, found, catalog);
         let is_listed = |star: &&StarIndex| found.matches.iter().any(|m| m.star == **star);
         let unlisted = among.iter().find(|star| !is_listed(star));
-        let (boresight, up_pa_rad) = found.icrs_to_camera.boresight_and_up();
+        let (boresight, up_pa_rad) = found.attitude(AttitudeFrame::Icrs).boresight_and_up();
         let (ra_rad, dec_rad) = boresight.to_ra_dec();
         let degrees = |rad: f64| to_decimals(rad * DEG_PER_RAD, 5);
         Self {
@@ -172,12 +173,11 @@ fn stars_among(published: &Published, found: &Identification, catalog: &Catalog)
         least - BORDER_PX..=values().fold(f64::NEG_INFINITY, f64::max) + BORDER_PX
     };
     let (columns, rows) = (bounds(|p| p.x), bounds(|p| p.y));
-    let years = published.date.years_since_j2000();
     let is_among = |star: &StarIndex| {
-        let direction = catalog.star(*star).direction_at(years);
+        let apparent = found.places.of(catalog.star(*star));
         let pixel = found
             .camera
-            .pixel_of(&found.icrs_to_camera.apply(&direction));
+            .pixel_of(&found.icrs_to_camera.apply(&apparent));
         pixel.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
     };
     let as_bright = catalog.brighter_than(published.faintest_vmag + ROUNDING_MAG);

@@ -35,6 +35,7 @@ pub use table::{
 pub use trial::{Answer, TrialResult, TrialResults};
 
 use crate::identify::{IndexedCatalog, identify};
+use crate::sky::places::StarPlaces;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -72,7 +73,7 @@ pub fn run_one(
     let centroids = SimulatedCentroids::draw(protocol, indexed, &mut rng);
     let priors = protocol.priors(&mut rng);
     let start = Instant::now();
-    let field = centroids.list.star_field(0.0);
+    let field = centroids.list.star_field(StarPlaces::default());
     let found = identify(&field, &priors, indexed);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
     TrialResult::new(&centroids, found.as_ref().ok(), time_ms)

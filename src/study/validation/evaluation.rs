@@ -230,7 +230,11 @@ impl<'a> Evaluation<'a> {
 
     fn frame_row(&self, assignments: &Assignments, star_rows: usize) -> FrameRecord {
         let (simulated, solution) = (self.simulated, self.solution);
-        let (boresight, up_pa_rad) = simulated.icrs_to_camera.boresight_and_up();
+        let pointing = &simulated.pointing;
+        let attitude = pointing
+            .places
+            .astrometric_attitude(&pointing.icrs_to_camera);
+        let (boresight, up_pa_rad) = attitude.boresight_and_up();
         let (ra_rad, dec_rad) = boresight.to_ra_dec();
         let degrees = |rad: f64| to_decimals(rad * DEG_PER_RAD, 7);
         let limit_vmag = self.validator.limit_vmag();
@@ -339,7 +343,7 @@ impl<'a> Evaluation<'a> {
             Answer::of(
                 found,
                 self.validator.simulator.camera(),
-                &truth.icrs_to_camera,
+                &truth.pointing.icrs_to_camera,
             )
         })
     }
@@ -362,7 +366,7 @@ impl<'a> Evaluation<'a> {
     /// Errors of attitude and focal length of a right answer, and their stated standard errors.
     fn attitude_fields(&self) -> Option<FrameRecord> {
         let found = self.found.filter(|_| self.answer() == Answer::Right)?;
-        let truth = &self.simulated.icrs_to_camera;
+        let truth = &self.simulated.pointing.icrs_to_camera;
         let turn = found.icrs_to_camera.matrix() * truth.matrix().transpose();
         let half = (turn - turn.transpose()) * 0.5;
         let error_rad = Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)]);

@@ -2,9 +2,11 @@
 //! for each, and a row for each run.
 
 use super::summary::Summary;
+use super::validator::Protocol;
 use crate::camera::LENS_TERMS;
 use crate::camera::data_sheet::SpotForm;
 use crate::model::simulate::{Setup, camera_of};
+use crate::sky::observer::Site;
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -15,65 +17,105 @@ pub struct HardCase {
     pub name: &'static str,
     /// What is hard about it.
     pub what: &'static str,
-    change: fn(&mut Setup),
+    change: fn(&mut Protocol),
 }
 
 impl HardCase {
-    /// The camera, sky and scene of the case.
-    pub fn setup(&self, base: &Setup) -> Setup {
-        let mut setup = base.clone();
-        (self.change)(&mut setup);
-        setup
+    /// What is simulated.
+    pub fn protocol(&self, base: &Protocol) -> Protocol {
+        let mut protocol = base.clone();
+        (self.change)(&mut protocol);
+        protocol
     }
 }
 
 /// The cases. Displacements by lenses are in thousandths of half of the diagonal.
-pub const HARD_SUITE: [HardCase; 19] = [
+pub const HARD_SUITE: [HardCase; 20] = [
     HardCase {
         name: "ideal",
         what: "as the camera is described",
         change: |_| (),
     },
     HardCase {
+        name: "through-air",
+        what: "from the ground, up to 70 degrees from the zenith: refraction",
+        change: |run| run.site = Site::new(50.0, 10.0, 300.0).ok(),
+    },
+    HardCase {
         name: "lens-r3",
         what: "lens with r³: 25 thousandths in the corner",
-        change: |setup| lens(setup, [25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-r3-r5",
         what: "r³ and r⁵: 25 thousandths",
-        change: |setup| lens(setup, [17.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [17.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-strong",
         what: "r³ and r⁵: 62 thousandths",
-        change: |setup| lens(setup, [83.0, -21.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [83.0, -21.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-r3-r5-r7",
         what: "r³, r⁵ and r⁷ of alternating sign",
-        change: |setup| lens(setup, [-69.0, 41.0, -17.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [-69.0, 41.0, -17.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-5-percent",
         what: "5 % at half of the width of a square frame",
-        change: |setup| lens(setup, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-decentred",
         what: "r³ and r⁵, decentred",
-        change: |setup| lens(setup, [28.0, -11.0, 0.0, 0.0, 0.0, 2.8, -1.4, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [28.0, -11.0, 0.0, 0.0, 0.0, 2.8, -1.4, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "lens-off-centre",
         what: "r³, and the axis 2 % of half of the diagonal off the centre",
-        change: |setup| lens(setup, [-50.0, 0.0, 0.0, 16.0, 12.0, 0.0, 0.0, 0.0, 0.0]),
+        change: |run| {
+            lens(
+                &mut run.setup,
+                [-50.0, 0.0, 0.0, 16.0, 12.0, 0.0, 0.0, 0.0, 0.0],
+            )
+        },
     },
     HardCase {
         name: "spot-disc",
         what: "spots are discs of 4 px radius",
-        change: |setup| {
-            let camera = &mut setup.scenario.camera;
+        change: |run| {
+            let camera = &mut run.setup.scenario.camera;
             camera.imperfections.spot_form = SpotForm::Disc;
             camera.spot_sigma_px = 2.0;
             camera.peak_share = None;
@@ -82,26 +124,26 @@ pub const HARD_SUITE: [HardCase; 19] = [
     HardCase {
         name: "spot-smeared",
         what: "stars smeared by 5 px along the rows",
-        change: |setup| setup.scenario.conditions.motion_px = 5.0,
+        change: |run| run.setup.scenario.conditions.motion_px = 5.0,
     },
     HardCase {
         name: "spot-elongated",
         what: "spots twice as long as wide, at 30 degrees",
-        change: |setup| {
-            let made = &mut setup.scenario.camera.imperfections;
+        change: |run| {
+            let made = &mut run.setup.scenario.camera.imperfections;
             (made.spot_axis_ratio, made.spot_angle_deg) = (2.0, 30.0);
         },
     },
     HardCase {
         name: "spot-coma",
         what: "coma of 6 px in the corner",
-        change: |setup| setup.scenario.camera.imperfections.coma_px = 6.0,
+        change: |run| run.setup.scenario.camera.imperfections.coma_px = 6.0,
     },
     HardCase {
         name: "spot-curved-field",
         what: "spots twice as wide in the corner",
-        change: |setup| {
-            let camera = &mut setup.scenario.camera;
+        change: |run| {
+            let camera = &mut run.setup.scenario.camera;
             // A disc has half of its radius as standard deviation on an axis.
             camera.imperfections.field_curvature_px = 2.0 * 3f64.sqrt() * camera.spot_sigma_px;
         },
@@ -109,8 +151,8 @@ pub const HARD_SUITE: [HardCase; 19] = [
     HardCase {
         name: "spot-astigmatism",
         what: "spots twice as long as wide in the corner, radially",
-        change: |setup| {
-            let camera = &mut setup.scenario.camera;
+        change: |run| {
+            let camera = &mut run.setup.scenario.camera;
             let radius_px = 3f64.sqrt() * camera.spot_sigma_px;
             camera.imperfections.field_curvature_px = radius_px;
             camera.imperfections.astigmatism_px = radius_px;
@@ -119,33 +161,33 @@ pub const HARD_SUITE: [HardCase; 19] = [
     HardCase {
         name: "spot-moffat",
         what: "wings of a Moffat profile with exponent 2.5",
-        change: |setup| setup.scenario.camera.imperfections.spot_form = SpotForm::Moffat,
+        change: |run| run.setup.scenario.camera.imperfections.spot_form = SpotForm::Moffat,
     },
     HardCase {
         name: "spot-airy",
         what: "Airy pattern of a pupil obstructed by a third",
-        change: |setup| {
-            let made = &mut setup.scenario.camera.imperfections;
+        change: |run| {
+            let made = &mut run.setup.scenario.camera.imperfections;
             (made.spot_form, made.obstruction) = (SpotForm::Airy, 0.33);
         },
     },
     HardCase {
         name: "vignetting",
         what: "60 % of the light lost in the corners",
-        change: |setup| setup.scenario.camera.imperfections.vignetting = 0.6,
+        change: |run| run.setup.scenario.camera.imperfections.vignetting = 0.6,
     },
     HardCase {
         name: "color-jpeg",
         what: "JPEG of a color camera: demosaiced, smoothed, with a tone curve",
-        change: |setup| {
-            let made = &mut setup.scenario.camera.imperfections;
+        change: |run| {
+            let made = &mut run.setup.scenario.camera.imperfections;
             (made.jpeg_quality, made.tone_gamma, made.denoise_px) = (90.0, 2.2, 0.7);
         },
     },
     HardCase {
         name: "response",
         what: "response of the pixels differs by 3 %",
-        change: |setup| setup.scenario.camera.imperfections.response_sigma = 0.03,
+        change: |run| run.setup.scenario.camera.imperfections.response_sigma = 0.03,
     },
 ];
 
@@ -304,18 +346,19 @@ mod tests {
     #[test]
     fn each_case_can_be_simulated_and_has_a_name_of_its_own() {
         for preset in Preset::ALL {
-            let base = Setup {
-                scenario: Scenario::of(preset),
-                scene: Scene::default(),
+            let base = Protocol {
+                setup: Setup {
+                    scenario: Scenario::of(preset),
+                    scene: Scene::default(),
+                },
+                scale_known: false,
+                site: None,
+                seed: 1,
             };
             let mut names = Vec::new();
             for case in HARD_SUITE {
-                assert_eq!(
-                    case.setup(&base).check(),
-                    Ok(()),
-                    "{} of {preset:?}",
-                    case.name
-                );
+                let setup = case.protocol(&base).setup;
+                assert_eq!(setup.check(), Ok(()), "{} of {preset:?}", case.name);
                 assert!(!names.contains(&case.name), "{}", case.name);
                 names.push(case.name);
             }

@@ -2,14 +2,17 @@
 
 use super::summary::RunFacts;
 use super::theory::Theory;
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+use crate::base::epoch::ObservationDate;
 use crate::detect::{DetectConfig, DetectError};
 use crate::frame::{Frame, FrameError};
-use crate::identify::IndexedCatalog;
+use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::sensitivity::{Budget, Detector, Rule, ScenarioError};
 use crate::model::simulate::{Pointing, Setup, Simulator, Truth};
 use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::Context;
+use crate::sky::observer::Site;
+use crate::sky::places::StarPlaces;
 use crate::study::robustness::random_rotation;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,6 +42,8 @@ pub struct Protocol {
     pub setup: Setup,
     /// Whether the pipeline is given the camera's data sheet, and thereby the scale.
     pub scale_known: bool,
+    /// Where the frames are taken, if not in space.
+    pub site: Option<Site>,
     /// Seed of the random numbers.
     pub seed: u64,
 }
@@ -51,13 +56,14 @@ pub struct Validator<'a> {
     pub(super) budget: Budget,
     pub(super) detector: Detector,
     pub(super) theory: Theory,
+    places: StarPlaces,
 }
 
 /// A simulated frame, not yet processed.
 pub(super) struct SimulatedFrame {
     pub(super) frame: Frame<'static>,
     pub(super) truth: Truth,
-    pub(super) icrs_to_camera: Rotation<Icrs, Camera>,
+    pub(super) pointing: Pointing,
     pub(super) seed: u64,
 }
 
@@ -67,6 +73,19 @@ pub fn draw(seed: u64, number: u64) -> (u64, Rotation<Icrs, Camera>) {
     random.set_stream(number);
     let icrs_to_camera = random_rotation(&mut random);
     (random.random(), icrs_to_camera)
+}
+
+/// A drawn attitude, with the boresight moved along its vertical so that it is uniformly distributed up to
+/// 70° from the zenith.
+fn raised(drawn: Rotation<Icrs, Camera>, zenith: &UnitVector<Icrs>) -> Rotation<Icrs, Camera> {
+    const LEAST_COSINE: f64 = 0.342;
+    let boresight = drawn.boresight();
+    let cosine = boresight.dot(zenith);
+    let away = boresight.as_vector() - zenith.as_vector() * cosine;
+    let raised = LEAST_COSINE + (1.0 - LEAST_COSINE) * (1.0 + cosine) / 2.0;
+    let sine = (1.0 - raised * raised).sqrt();
+    let moved = zenith.as_vector() * raised + away.normalize() * sine;
+    drawn.turned_to(&UnitVector::from_vector(moved))
 }
 
 impl<'a> Validator<'a> {
@@ -93,6 +112,8 @@ impl<'a> Validator<'a> {
             zenith_distance_deg: None,
             extinction: None,
         });
+        // A frame without a date would lack aberration.
+        let date = ObservationDate::J2000;
         Ok(Self {
             simulator,
             context: Context {
@@ -102,8 +123,17 @@ impl<'a> Validator<'a> {
                 },
                 // Without the exposure: the limit is predicted here, once for all frames.
                 camera,
+                priors: Priors {
+                    date: Some(FrameDate {
+                        date,
+                        source: DateSource::User,
+                    }),
+                    site: protocol.site,
+                    ..Priors::default()
+                },
                 ..Context::new(indexed)
             },
+            places: StarPlaces::at(&date, protocol.site, None),
             theory: Theory::of(scenario, &budget),
             protocol: protocol.clone(),
             budget,
@@ -136,16 +166,19 @@ impl<'a> Validator<'a> {
 
     /// Simulates the frame with this number.
     pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, ValidationError> {
-        let (seed, icrs_to_camera) = self.draw(number);
+        let (seed, drawn) = self.draw(number);
+        let places = self.places;
+        let zenith = places.zenith();
+        let icrs_to_camera = zenith.map_or(drawn, |zenith| raised(drawn, zenith));
         let pointing = Pointing {
-            icrs_to_camera,
-            years_since_j2000: 0.0,
+            icrs_to_camera: places.apparent_attitude(&icrs_to_camera),
+            places,
         };
         let (frame, truth) = self.simulator.frame(&pointing, seed)?;
         Ok(SimulatedFrame {
             frame,
             truth,
-            icrs_to_camera,
+            pointing,
             seed,
         })
     }

@@ -14,6 +14,7 @@ use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
 use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
 use starpipe::pipeline::{Context, Workspace, solve_frame};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 use std::f64::consts::{PI, TAU};
 
 /// Approximate threshold of the detector in standard deviations.
@@ -105,7 +106,7 @@ fn trial(
     );
     let pointing = Pointing {
         icrs_to_camera: Rotation::looking_at(&boresight, random.random_range(-PI..PI)),
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
     };
     let stars = context.indexed.catalog().stars();
     let simulator = Simulator::new(scenario, &Scene::default(), stars).unwrap();

@@ -7,6 +7,7 @@ use starpipe::frame::Frame;
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::sky::catalog::Catalog;
+use starpipe::sky::places::StarPlaces;
 
 /// Time from frame to frame, in seconds.
 pub const INTERVAL_S: f64 = 0.1;
@@ -46,7 +47,7 @@ pub fn frame(at: Rotation<Icrs, Camera>, rate_deg_s: Vector3<f64>, seed: u64) ->
     let simulator = Simulator::new(&scenario(), &scene, stars).expect("a valid camera");
     let pointing = Pointing {
         icrs_to_camera: at,
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
     };
     simulator.frame(&pointing, seed).expect("a frame").0
 }

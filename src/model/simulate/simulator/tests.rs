@@ -4,12 +4,13 @@ use crate::base::units::RAD_PER_DEG;
 use crate::camera::DistortionModel;
 use crate::camera::data_sheet::{DataSheet, Preset};
 use crate::sky::catalog::{StarId, StarIndex};
+use crate::sky::places::StarPlaces;
 
 fn pointing() -> Pointing {
     let boresight = UnitVector::from_ra_dec(1.0, 0.3);
     Pointing {
         icrs_to_camera: Rotation::looking_at(&boresight, 40.0 * RAD_PER_DEG),
-        years_since_j2000: 0.0,
+        places: StarPlaces::default(),
     }
 }
 

@@ -25,6 +25,7 @@ struct Identity<'a> {
     version: &'static str,
     seed: u64,
     scale_known: bool,
+    site: Option<[f64; 3]>,
     camera: &'a str,
     reading: Reading,
     spot_form: &'a str,
@@ -99,6 +100,9 @@ fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json:
         version: env!("CARGO_PKG_VERSION"),
         seed: protocol.seed,
         scale_known: protocol.scale_known,
+        site: protocol
+            .site
+            .map(|site| [site.lat_deg(), site.lon_deg(), site.height_m()]),
         camera: &scenario.camera.name,
         reading: scenario.reading,
         spot_form: imperfections.spot_form.name(),
@@ -146,6 +150,7 @@ mod tests {
     fn a_directory_is_of_one_run() {
         let directory = tempfile::tempdir().unwrap();
         let mut protocol = Protocol {
+            site: None,
             setup: Setup {
                 scenario: Scenario::of(Preset::NanosatTracker),
                 scene: Scene::default(),
