@@ -40,7 +40,7 @@ pub(super) const LENS_PARAMETERS: usize = POSE_PARAMETERS + LENS_TERMS;
 /// Parameters with all terms of any distortion.
 pub(super) const MAX_PARAMETERS: usize = POSE_PARAMETERS + MAX_TERMS;
 /// Maximum number of steps.
-const MAX_ITERATIONS: usize = 15;
+const MAX_ITERATIONS: usize = 30;
 /// Smallest share of a step that is tried.
 const MIN_SHARE: f64 = 0.01;
 /// Largest step in radians: beyond it the fit has diverged.
@@ -355,19 +355,28 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         }
     }
 
-    /// Gauss-Newton steps, shortened where a whole one makes the fit worse, until a step moves the
+    /// Gauss-Newton steps, shortened where a whole one makes the fit worse or steps go to and fro, until a step moves the
     /// predicted places by less than `converged`, as root mean square in standard errors. Returns the
     /// normal equations. `None` where it does not converge, or the stars do not determine the parameters.
     pub fn converge(&mut self, converged: f64) -> Option<Normal<P>> {
         let mut normal = self.normal()?;
+        let equations = 2.0 * self.stars.len() as f64;
+        let mut moved_before = SVector::zeros();
         for _ in 0..MAX_ITERATIONS {
-            let (change, moved) = self.change(&normal)?;
-            if moved < converged {
+            let change = self.change(&normal)?;
+            // By how much the step moves the predicted places, in standard errors.
+            let moved = normal.root.l().tr_mul(&change);
+            if moved.norm_squared() < converged * converged * equations {
                 self.take(&change, 1.0);
                 return Some(normal);
             }
             let before = self.predictor;
-            let mut share = 1.0;
+            let mut share = if moved.dot(&moved_before) < 0.0 {
+                0.5
+            } else {
+                1.0
+            };
+            moved_before = moved;
             normal = loop {
                 self.take(&change, share);
                 match self.normal() {
@@ -383,9 +392,8 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         None
     }
 
-    /// The change of the parameters that the normal equations ask for, and by how much it moves the
-    /// predicted places.
-    fn change(&self, normal: &Normal<P>) -> Option<(SVector<f64, P>, f64)> {
+    /// The change of the parameters that the normal equations ask for.
+    fn change(&self, normal: &Normal<P>) -> Option<SVector<f64, P>> {
         let mut change = normal.root.solve(&normal.vector);
         let turn = Vector3::new(change[0], change[1], change[2]);
         let size = turn.norm().max(change[3].abs());
@@ -396,8 +404,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         for (change, known) in change.iter_mut().skip(POSE_PARAMETERS).zip(known) {
             *change -= known;
         }
-        let moved = normal.root.l().tr_mul(&change).norm_squared();
-        Some((change, (moved / (2.0 * self.stars.len() as f64)).sqrt()))
+        Some(change)
     }
 
     /// Changes the parameters by a share of `change`.
