@@ -51,6 +51,7 @@
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`pipeline`] | what does a frame show: the stages in order |
+//! | [`lens`] | which lens, from several frames of a camera at once |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
@@ -74,6 +75,7 @@ pub mod camera;
 pub mod detect;
 pub mod frame;
 pub mod identify;
+pub mod lens;
 pub mod model;
 pub mod photometry;
 pub mod pipeline;

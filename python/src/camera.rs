@@ -2,7 +2,7 @@
 
 use crate::errors::exception;
 use pyo3::prelude::*;
-use starpipe::camera::data_sheet::{DataSheet, Preset};
+use starpipe::camera::data_sheet::{CameraDescription, DataSheet, Preset};
 use starpipe::model::sensitivity::{Parameter, Reading, Scenario};
 use starpipe::model::simulate::{Scene, Setup, SetupParameter};
 use std::path::{Path, PathBuf};
@@ -19,6 +19,14 @@ pub fn data_sheet(camera: &Path) -> PyResult<DataSheet> {
     match preset(camera) {
         Some(preset) => Ok(preset.data_sheet()),
         None => DataSheet::read(camera).map_err(exception),
+    }
+}
+
+/// The description of a preset, or that in a file.
+pub fn description(camera: &Path) -> PyResult<CameraDescription> {
+    match preset(camera) {
+        Some(preset) => Ok(preset.data_sheet().into()),
+        None => CameraDescription::read(camera).map_err(exception),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The pipeline: catalogue, camera and buffers that solve frames.
 
-use crate::camera::data_sheet;
+use crate::camera::description;
 use crate::catalogs;
 use crate::errors::exception;
 use crate::image::{Image, Source, bad_pixels};
@@ -10,7 +10,7 @@ use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use starpipe::calibration::Master;
-use starpipe::camera::data_sheet::DataSheet;
+use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
 use starpipe::photometry::instrumental_mag;
@@ -28,7 +28,7 @@ use std::sync::Mutex;
 #[pyclass(frozen, module = "starpipe._starpipe")]
 pub struct Pipeline {
     pub indexed: &'static IndexedCatalog<'static>,
-    camera: Option<DataSheet>,
+    camera: Option<CameraDescription>,
     /// Buffers that no thread uses at present.
     workspaces: Mutex<Vec<Workspace>>,
 }
@@ -47,7 +47,7 @@ impl Pipeline {
         on_threads(py, all, |interrupt| {
             Ok(Self {
                 indexed: catalogs::open((catalog, cache_dir), interrupt)?,
-                camera: camera.as_deref().map(data_sheet).transpose()?,
+                camera: camera.as_deref().map(description).transpose()?,
                 workspaces: Mutex::default(),
             })
         })
@@ -211,7 +211,8 @@ impl Pipeline {
         };
         let dark = dark.map(&mut master).transpose()?;
         let flat = flat.map(&mut master).transpose()?;
-        let bias_adu = self.camera.as_ref().map_or(0.0, |sheet| sheet.bias_adu);
+        let sheet = self.camera.as_ref().and_then(|camera| camera.sheet.as_ref());
+        let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
         Calibration::new(dark, flat, None, bias_adu).map_err(exception)
     }
 

@@ -3,17 +3,20 @@
 //! - [`CameraModel`]: pixel ↔ direction in camera axes, any lens with its distortion.
 //! - [`data_sheet`]: `camera.toml` → [`DataSheet`](data_sheet::DataSheet), pixels, lens and
 //!   detector.
+//! - [`KnownLens`]: a camera model that was measured, with its errors.
 //!
 //! direction → axes of the lens → [`Projection`] → [`Distortion`] → offset from the frame's centre (x
 //! reversed if the frame is mirrored) → pixel; and the same way back.
 
 pub mod data_sheet;
 mod distortion;
+mod known_lens;
 mod model;
 mod projection;
 
 pub use distortion::{Distortion, DistortionModel, LENS_TERMS};
 pub(crate) use distortion::{MAX_TERMS, MONOMIALS, Observed, monomials};
+pub use known_lens::KnownLens;
 pub use model::CameraModel;
 #[doc(hidden)]
 pub use model::focal_length_px;

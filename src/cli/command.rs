@@ -1,6 +1,7 @@
 //! The list of commands.
 
 use super::archive::ArchiveArgs;
+use super::calibrate::CalibrateArgs;
 use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::clutter::ClutterArgs;
@@ -47,6 +48,8 @@ pub(crate) enum Command {
     Identify(IdentifyArgs),
     /// Follow the attitude of a camera from frame to frame
     Track(Box<TrackArgs>),
+    /// Measure the lens of a camera in several of its frames
+    Calibrate(Box<CalibrateArgs>),
     /// Convert star catalogues
     Catalog(CatalogArgs),
     /// Measure how often identification is right, wrong or fails, on simulated lists of centroids

@@ -46,7 +46,7 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
     stdin::check_once(&lists)?;
     let plan = Plan {
         options: solving.options()?,
-        camera: solving.hints.data_sheet()?,
+        camera: solving.hints.description()?,
         ..Plan::default()
     };
     let mut options = CentroidListOptions::default();

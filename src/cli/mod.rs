@@ -8,6 +8,7 @@
 
 mod archive;
 mod batch;
+mod calibrate;
 mod camera;
 mod catalog;
 mod clutter;
@@ -71,6 +72,7 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Archive(arguments) => archive::archive(&arguments),
         Command::Track(arguments) => track::track(&arguments),
+        Command::Calibrate(arguments) => calibrate::calibrate(*arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Clutter(arguments) => clutter::clutter(&arguments),

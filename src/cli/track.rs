@@ -70,12 +70,12 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
             "- stands for the list on standard input, which can be read only once; it is given twice",
         ));
     }
-    let sheet = arguments.hints.data_sheet()?;
-    let calibration = arguments.calibration.read(sheet.as_ref())?;
+    let camera = arguments.hints.description()?;
+    let calibration = arguments.calibration.read(camera.as_ref())?;
     let mut options = arguments.hints.options()?;
     options.exposure_s = arguments.exposure;
     arguments.catalog.with_index(|_, indexed| {
-        let context = Context::new(indexed).with_options(&options, sheet.clone());
+        let context = Context::new(indexed).with_options(&options, camera.clone());
         let mut run = Run {
             tracker: Tracker::new(context).with_stars(arguments.max_stars as usize),
             calibration: calibration.as_ref(),

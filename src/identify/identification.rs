@@ -21,6 +21,8 @@ pub struct Identification {
     pub icrs_to_camera: Rotation<Icrs, Camera>,
     /// Where the catalogue's stars appear.
     pub places: StarPlaces,
+    /// Whether the lens was known, and held.
+    pub lens_is_known: bool,
     /// Covariance of the attitude error, as small rotations about the camera's x, y and z axes, in
     /// rad².
     pub attitude_covariance_rad2: Matrix3<f64>,

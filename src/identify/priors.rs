@@ -4,7 +4,7 @@ use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
-use crate::camera::{self};
+use crate::camera::{self, KnownLens};
 use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
 use nalgebra::Vector3;
@@ -41,6 +41,8 @@ pub struct Priors {
     pub site: Option<Site>,
     /// The observer's velocity relative to the Earth's centre, in ICRS axes, where it is not a site's.
     pub velocity_km_s: Option<Vector3<f64>>,
+    /// Whether the lens is one that was measured.
+    pub holds_lens: bool,
     /// Exposure time, in seconds.
     pub exposure_s: Option<f64>,
 }
@@ -133,6 +135,17 @@ impl ScalePrior {
         Self::by_user(Scale::Pixel(middle_rad), tolerance)
     }
 
+    /// The scale of a lens that was measured.
+    pub fn of_lens(lens: &KnownLens) -> Self {
+        /// Temperature, focus and refraction change it by less.
+        const TOLERANCE: f64 = 0.01;
+        Self {
+            scale: Scale::Pixel(1.0 / lens.camera().central_focal_length_px()),
+            tolerance: TOLERANCE,
+            source: ScaleSource::Camera,
+        }
+    }
+
     /// The scale of a camera by its data sheet.
     pub fn of_camera(sheet: &DataSheet) -> Self {
         Self {
@@ -204,10 +217,11 @@ impl Priors {
         self.scale.is_some() || self.near.is_some()
     }
 
-    /// The same without a scale that is only tried first.
+    /// The same without a scale and a lens that are only tried first.
     pub fn binding(&self) -> Self {
         Self {
             scale: self.scale.filter(ScalePrior::is_binding),
+            holds_lens: false,
             ..*self
         }
     }

@@ -4,6 +4,7 @@
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::interrupt::Interrupt;
 use crate::base::units::RAD_PER_DEG;
+use crate::camera::KnownLens;
 use crate::camera::{CameraModel, DistortionModel};
 use crate::identify::effort::Effort;
 use crate::identify::field::{CoarserFields, StarField};
@@ -19,6 +20,7 @@ use crate::identify::search::{
 };
 use crate::sky::places::StarPlaces;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Numbers of stars, the brightest, that decide how much distortion is fitted. Where most
 /// detections are none, the fewer brightest have less chance pairs among them.
@@ -119,6 +121,11 @@ impl Workspace {
     /// From the next field on, searches do as much as `effort` says.
     pub fn set_effort(&mut self, effort: Effort) {
         self.effort = effort;
+    }
+
+    /// From the next field on, this lens is held, in fields of its size.
+    pub fn set_known_lens(&mut self, lens: Option<&Arc<KnownLens>>) {
+        self.buffers.refiner.set_known_lens(lens);
     }
 
     /// Searches end with [`SearchFailure::Interrupted`] when `interrupt` is due.
@@ -570,6 +577,7 @@ fn identification(
         camera: known_part(&fit.camera, &fit.icrs_to_camera, &matches),
         icrs_to_camera: fit.icrs_to_camera,
         places,
+        lens_is_known: false,
         excess_sigma_px: refined.excess_sigma_px,
         rms_px: (sum_sq / matches.len().max(1) as f64).sqrt(),
         matches,

@@ -152,6 +152,7 @@ mod tests {
         });
         let identification = Identification {
             places: StarPlaces::default(),
+            lens_is_known: false,
             camera: CameraModel::pinhole(SIDE_PX, SIDE_PX, 2000.0, false),
             icrs_to_camera: Rotation::looking_at(&centre, 0.0),
             attitude_covariance_rad2: Matrix3::zeros(),

@@ -185,6 +185,7 @@ mod tests {
         });
         let found = Identification {
             places: StarPlaces::default(),
+            lens_is_known: false,
             camera,
             icrs_to_camera,
             attitude_covariance_rad2: Matrix3::zeros(),

@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::identification::{attempt, identified, observation, through_air_or_not};
+use super::identification::{identified, observation, search, through_air_or_not};
 use super::left_out::{LeftOut, RowProblem};
 use super::note::Note;
 use super::solution::{Solution, Source};
@@ -200,16 +200,18 @@ pub fn solve_centroids(
         source: ScaleSource::User,
         ..ScalePrior::of_camera(&camera.sheet)
     });
+    let [width_px, height_px] = [list.width, list.height].map(|side| side as f64);
+    let lens_scale = context.lens_scale(width_px, height_px);
     let priors = &Priors {
-        scale: context.priors.scale.or(of_camera),
+        scale: context.priors.scale.or(lens_scale).or(of_camera),
+        holds_lens: context.lens_of(width_px, height_px).is_some(),
         ..context.priors
     };
     let (list, left_out) = list.usable();
     let (mut outcome, _) = through_air_or_not(priors.places(), |places| {
         let field = list.star_field(places);
-        let field_and_coarser = (&field, None);
         let workspace = &mut workspace.identify;
-        let found = attempt(field_and_coarser, priors, context, workspace, &mut clock);
+        let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
         identified(found, None, &field, priors, context.indexed)
     });
     let observation = observation(&outcome, priors);
@@ -229,6 +231,7 @@ pub fn solve_centroids(
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
     let notes = notes.chain(Note::of_residuals(outcome.identification()));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
+    let notes = notes.chain(Note::of_lens(context.lens.as_deref(), &outcome));
     let notes = notes.chain(Note::of_date(priors, &outcome));
     Solution {
         width: list.width,

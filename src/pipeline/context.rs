@@ -3,12 +3,14 @@
 use crate::base::epoch::ObservationDate;
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
+use crate::camera::KnownLens;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
 use crate::identify::{self, DateSource, Effort, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::places::AttitudeFrame;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long a frame may take by default where many are solved, in seconds.
@@ -26,6 +28,8 @@ pub struct Context<'a> {
     pub priors: Priors,
     /// The camera with which frames are compared.
     pub camera: Option<ObservingSetup>,
+    /// The lens with which they were taken, where it was measured.
+    pub lens: Option<Arc<KnownLens>>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
@@ -53,6 +57,7 @@ impl<'a> Context<'a> {
             detect: DetectConfig::default(),
             priors: Priors::default(),
             camera: None,
+            lens: None,
             calibration: None,
             attitude_only: false,
             attitude_frame: AttitudeFrame::default(),
@@ -77,14 +82,30 @@ impl<'a> Context<'a> {
                 DateSource::FileName,
             );
         Priors {
+            holds_lens: self
+                .lens_of(frame.width as f64, frame.height as f64)
+                .is_some(),
             scale: priors
                 .scale
+                .or(self.lens_scale(frame.width as f64, frame.height as f64))
                 .or(camera_scale.map(ScalePrior::of_camera))
                 .or(header_scale),
             site: priors.site.or(header.site),
             exposure_s: priors.exposure_s.or(header.exposure_s),
             ..priors
         }
+    }
+
+    /// The lens of frames of this size, where it was measured.
+    pub(super) fn lens_of(&self, width_px: f64, height_px: f64) -> Option<&Arc<KnownLens>> {
+        let lens = self.lens.as_ref();
+        lens.filter(|lens| lens.is_of_size(width_px, height_px))
+    }
+
+    /// The scale of that lens.
+    pub(super) fn lens_scale(&self, width_px: f64, height_px: f64) -> Option<ScalePrior> {
+        let lens = self.lens_of(width_px, height_px);
+        lens.map(|lens| ScalePrior::of_lens(lens))
     }
 
     /// How to detect stars in one frame: pixels at the stated camera's full well are saturated.

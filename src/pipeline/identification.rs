@@ -37,7 +37,7 @@ pub(super) fn identify_stars(
     } = workspace;
     let (mut found, dropped_scale) = {
         let coarser = CoarseFrames::new(frame, detector, places);
-        search((&field, &coarser), priors, context, workspace, clock)
+        search((&field, Some(&coarser)), priors, context, workspace, clock)
     };
     if found.is_err() && may_be_wide(detections) {
         let is_star = |source: &Detection| source.flags.may_be_wide_star();
@@ -152,32 +152,48 @@ fn negative(
 /// Result of the search, and the scale that was dropped because nothing matched with it.
 type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
 
-/// Searches for `field`. A scale that is not the user's is tried first and dropped where nothing
-/// matches with it.
-fn search(
-    (field, coarser): (&StarField, &dyn CoarserFields),
+/// Searches for `field`. A scale that is not the user's and a lens that was measured are tried first, and
+/// dropped where nothing matches with them, or the stars are clearly elsewhere than this lens sees them.
+pub(super) fn search(
+    (field, coarser): (&StarField, Option<&dyn CoarserFields>),
     priors: &Priors,
     context: &Context,
     workspace: &mut identify::Workspace,
     clock: &mut Stopwatch,
 ) -> Searched {
     // Names are those of detections, and without a whole search there are only those.
-    let field = (field, (!context.attitude_only).then_some(coarser));
+    let field = (field, coarser.filter(|_| !context.attitude_only));
     let first = attempt(field, priors, context, workspace, clock);
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
-    let (Err(failure), Some(scale)) = (&first, tentative) else {
+    if tentative.is_none() && !priors.holds_lens {
         return (first, None);
+    }
+    let failure = match first {
+        Ok(found) if !is_of_other_lens(&found) => return (Ok(found), None),
+        Ok(found) => {
+            let free = attempt(field, &priors.binding(), context, workspace, clock).ok();
+            let better = free.filter(|free| 2.0 * free.excess_sigma_px < found.excess_sigma_px);
+            return (Ok(better.unwrap_or(found)), None);
+        }
+        Err(failure) => failure,
     };
     let second = attempt(field, &priors.binding(), context, workspace, clock);
     match second.map(at_second_attempt) {
-        Ok(Some(found)) => (Ok(found), Some(scale)),
-        Ok(None) => (Err(*failure), None),
+        Ok(Some(found)) => (Ok(found), tentative),
+        Ok(None) => (Err(failure), None),
         Err(failure) => (Err(failure), None),
     }
 }
 
+/// Whether a lens was held, and the residuals are larger than its errors and those of the stars.
+fn is_of_other_lens(found: &Identification) -> bool {
+    /// What a lens that is known well misses.
+    const TOLERANCE_PX: f64 = 0.05;
+    found.lens_is_known && found.excess_sigma_px > TOLERANCE_PX
+}
+
 /// Pointing, then names, each timed; the pointing alone where no more is wanted.
-pub(super) fn attempt(
+fn attempt(
     (field, coarser): (&StarField, Option<&dyn CoarserFields>),
     priors: &Priors,
     context: &Context,
@@ -186,16 +202,22 @@ pub(super) fn attempt(
 ) -> Result<Identification, SearchFailure> {
     workspace.set_name_odds(context.name_odds);
     workspace.set_effort(context.effort);
+    let lens = context.lens.as_ref().filter(|_| priors.holds_lens);
+    workspace.set_known_lens(lens);
+    let finished = |found: Identification| Identification {
+        lens_is_known: lens.is_some(),
+        ..found
+    };
     if context.attitude_only {
         let found = workspace.attitude(field, priors, context.indexed);
         clock.lap(Stage::Pointing);
-        return found.cloned();
+        return found.cloned().map(finished);
     }
     let pointing = workspace.find_pointing_with(field, coarser, priors, context.indexed);
     clock.lap(Stage::Pointing);
     let found = pointing?.name_stars();
     clock.lap(Stage::Naming);
-    found.cloned()
+    found.cloned().map(finished)
 }
 
 /// An identification at the second attempt, where it is still sure. Chance had at most twice the

@@ -8,6 +8,7 @@ use super::raw_color::RawColor;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
+use crate::camera::KnownLens;
 use crate::detect::{MeasuredPsf, NoiseTail, StarTrails, Wings};
 use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
@@ -62,6 +63,20 @@ pub enum Note {
     BelowHorizon {
         /// How far below, in radians.
         depth_rad: f64,
+    },
+    /// The frame was not taken with the lens that was measured, or that has changed.
+    OtherLens {
+        /// Focal length of that lens in the frame's centre, in pixels.
+        known_px: f64,
+        /// Focal length that the stars have, in pixels.
+        found_px: f64,
+    },
+    /// The lens was measured in frames of another size.
+    LensOfOtherSize {
+        /// Columns and rows of those, in pixels.
+        known_px: [f64; 2],
+        /// Columns and rows of this frame, in pixels.
+        found_px: [f64; 2],
     },
     /// The date is unknown.
     NoDate,
@@ -124,6 +139,8 @@ impl Note {
             Self::MoreStars { .. } => "more_stars",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
+            Self::OtherLens { .. } => "lens_differs",
+            Self::LensOfOtherSize { .. } => "lens_of_other_size",
             Self::NoDate => "date_unknown",
             Self::NoTimeOfDay => "time_of_day_unknown",
             Self::NoExposure => "exposure_unknown",
@@ -203,6 +220,20 @@ impl Note {
     pub(super) fn of_pointing(attitude_only: bool, outcome: &Outcome) -> Option<Self> {
         let is_found = outcome.identification().is_some();
         (attitude_only && is_found).then_some(Self::AttitudeOnly)
+    }
+
+    /// Why the lens that was measured was not held.
+    pub(super) fn of_lens(lens: Option<&KnownLens>, outcome: &Outcome) -> Option<Self> {
+        let (lens, found) = (lens?.camera(), outcome.identification()?);
+        let [known_px, found_px] =
+            [lens, &found.camera].map(|camera| [camera.width_px, camera.height_px]);
+        if known_px != found_px {
+            return Some(Self::LensOfOtherSize { known_px, found_px });
+        }
+        (!found.lens_is_known).then(|| Self::OtherLens {
+            known_px: lens.central_focal_length_px(),
+            found_px: found.camera.central_focal_length_px(),
+        })
     }
 
     /// What an identified frame without a date lacks.
@@ -314,6 +345,13 @@ impl fmt::Display for Note {
             Self::RowsLeftOut(rows) => rows.fmt(f),
             Self::DefectiveColumns(columns) => write_columns(f, columns),
             Self::ColorMosaic(mosaic) => write_mosaic(f, mosaic),
+            Self::OtherLens { known_px, found_px } => write!(
+                f,
+                "the stars are not where the lens in the description of the camera sees them: another lens, another focus, or it has moved; its focal length is {known_px:.2} px, that of this frame {found_px:.2} px"
+            ),
+            Self::LensOfOtherSize { known_px, found_px } => {
+                write_other_size(f, *known_px, *found_px)
+            }
             Self::WrongHeaderScale {
                 pixel_scale_rad: [low_rad, high_rad],
             } => write!(
@@ -378,6 +416,23 @@ fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64
         "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors \
          explain: the lens or the spots are not as assumed; the stated errors include \
          {excess_sigma_px:.1} px a star on each axis"
+    )
+}
+
+fn write_other_size(f: &mut fmt::Formatter<'_>, known: [f64; 2], found: [f64; 2]) -> fmt::Result {
+    let [x, y] = [known[0] / found[0], known[1] / found[1]];
+    write!(
+        f,
+        "the lens in the description of the camera was measured in frames of {} x {} px, and is not used: this frame is {}",
+        known[0],
+        known[1],
+        if x == y && x.fract() == 0.0 {
+            format!("binned {x} x {x}")
+        } else if found[0] == known[1] && found[1] == known[0] {
+            "turned by a quarter".to_owned()
+        } else {
+            "of another camera, or a part of one".to_owned()
+        }
     )
 }
 

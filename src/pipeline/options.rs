@@ -4,7 +4,7 @@ use super::context::{Context, DEFAULT_TIME_LIMIT_S};
 use crate::base::coords::UnitVector;
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
-use crate::camera::data_sheet::DataSheet;
+use crate::camera::data_sheet::{CameraDescription, DataSheet};
 use crate::detect::{CentroidMethod, DetectConfig};
 use crate::identify::{
     DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion,
@@ -73,6 +73,8 @@ pub struct SolveOptions {
     pub name_odds: f64,
     /// How much is tried to identify a frame.
     pub effort: Effort,
+    /// Whether a lens that was measured is only the start of a fit.
+    pub refine_lens: bool,
     /// Whether to stop at attitude and optics, from the brightest stars.
     pub attitude_only: bool,
     /// How long a frame may take.
@@ -108,6 +110,7 @@ impl SolveOptions {
             }),
             site: self.site,
             velocity_km_s: self.velocity_km_s.map(Into::into),
+            holds_lens: false,
             exposure_s: self.exposure_s,
         }
     }
@@ -156,6 +159,7 @@ impl Default for SolveOptions {
             centroid: detect.centroid,
             name_odds: NAME_ODDS,
             effort: Effort::Normal,
+            refine_lens: false,
             attitude_only: false,
             time_limit_s: Some(DEFAULT_TIME_LIMIT_S),
         }
@@ -177,7 +181,7 @@ impl<'a> Context<'a> {
     /// let mut options = SolveOptions::default();
     /// options.exposure_s = Some(1.0);
     /// options.extinction_mag_per_airmass = Some(0.0);
-    /// let context = Context::new(&indexed).with_options(&options, Some(camera));
+    /// let context = Context::new(&indexed).with_options(&options, Some(camera.into()));
     /// let file = "fixtures/cygnus/cygnus.tif";
     /// let solution = solve_file(file, None, &context, &mut Workspace::new())?;
     /// // The exposure is known, so the frame is compared with what the camera should see.
@@ -187,12 +191,14 @@ impl<'a> Context<'a> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_options(self, options: &SolveOptions, camera: Option<DataSheet>) -> Self {
+    pub fn with_options(self, options: &SolveOptions, camera: Option<CameraDescription>) -> Self {
         let limit_s = options.time_limit_s;
+        let CameraDescription { sheet, lens } = camera.unwrap_or_default();
         Self {
             detect: options.detect_config(),
             priors: options.priors(),
-            camera: camera.map(|sheet| options.observing_setup(sheet)),
+            camera: sheet.map(|sheet| options.observing_setup(sheet)),
+            lens: lens.filter(|_| !options.refine_lens),
             name_odds: options.name_odds,
             effort: options.effort,
             attitude_only: options.attitude_only,

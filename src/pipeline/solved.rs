@@ -162,6 +162,7 @@ impl SolvedFrame<'_> {
             .chain(self.mosaic.map(Note::ColorMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(self.more_stars.map(|wanted| Note::MoreStars { wanted }))
+            .chain(Note::of_lens(self.context.lens.as_deref(), outcome))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))

@@ -213,6 +213,7 @@ fn optics(identification: &Identification) -> OpticsReport {
         .all(|corner| camera.direction_of(corner).is_some());
     let degrees = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 6);
     OpticsReport {
+        held: identification.lens_is_known,
         fov_x_deg: camera.fov_x_rad().map(degrees),
         fov_y_deg: camera.fov_y_rad().map(degrees),
         model: camera.projection().name(),

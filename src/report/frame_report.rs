@@ -182,6 +182,8 @@ pub struct AttitudeSigma {
 /// The fitted camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OpticsReport {
+    /// Whether the lens is the one that was measured (`[lens]` of the camera's description), and was held.
+    pub held: bool,
     /// Angle between the middles of the left and right borders, in degrees; none where one of them does
     /// not see the sky.
     pub fov_x_deg: Option<f64>,

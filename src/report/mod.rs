@@ -14,6 +14,7 @@ mod bodies;
 mod build;
 mod digits;
 mod frame_report;
+mod lens;
 #[cfg(feature = "overlay")]
 pub mod overlay;
 mod prediction;
@@ -36,6 +37,7 @@ pub use frame_report::{
     Status, TimingReport,
 };
 pub use frame_report::{FrameReport, SCHEMA};
+pub use lens::LensReport;
 #[doc(hidden)]
 pub use star_row::{StarRow, write_table_header};
 #[doc(hidden)]

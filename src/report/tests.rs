@@ -132,6 +132,7 @@ fn photometry() -> PhotometryReport {
 
 fn optics() -> OpticsReport {
     OpticsReport {
+        held: false,
         fov_x_deg: Some(20.012_345),
         fov_y_deg: Some(15.081_234),
         model: "pinhole",

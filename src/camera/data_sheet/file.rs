@@ -7,7 +7,7 @@ use super::response::{Response, ResponseError};
 use super::sheet::DataSheet;
 use super::spot_image::{SpotImage, SpotImageError};
 use crate::base::files;
-use crate::camera::Projection;
+use crate::camera::{KnownLens, Projection};
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::ops::Range;
@@ -133,6 +133,73 @@ fn is_optional(name: &str) -> bool {
 
 type Table = BTreeMap<Spanned<String>, Spanned<toml::Value>>;
 
+/// The table of a file that is of a measured lens, and not of the data sheet.
+const LENS: &str = "lens";
+
+/// The text of a description, if it is not too long.
+fn text_of(path: &Path) -> Result<String, DataSheetError> {
+    let failed = |source| DataSheetError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let file = files::open(path).map_err(failed)?;
+    let mut text = String::new();
+    file.take(MAX_BYTES + 1)
+        .read_to_string(&mut text)
+        .map_err(failed)?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(DataSheetError::TooLarge {
+            path: path.to_owned(),
+            limit: MAX_BYTES,
+        });
+    }
+    Ok(text)
+}
+
+/// What a `camera.toml` describes: the camera by its data sheet, a lens that was measured, or both.
+#[derive(Debug, Clone, Default)]
+pub struct CameraDescription {
+    /// The data sheet.
+    pub sheet: Option<DataSheet>,
+    /// The lens.
+    pub lens: Option<Arc<KnownLens>>,
+}
+
+impl CameraDescription {
+    /// Reads a `camera.toml`. File names in it are relative to its directory.
+    ///
+    /// # Errors
+    /// [`DataSheetError`] with the file, the line and the key.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, DataSheetError> {
+        let path = path.as_ref();
+        let text = text_of(path)?;
+        let lens = KnownLens::parse(path, &text)?.map(Arc::new);
+        let file = SheetFile::parse(path, &text)?;
+        let is_lens_alone = lens.is_some() && file.table.is_empty();
+        let sheet = (!is_lens_alone).then(|| file.data_sheet()).transpose()?;
+        Ok(Self { sheet, lens })
+    }
+}
+
+impl From<DataSheet> for CameraDescription {
+    fn from(sheet: DataSheet) -> Self {
+        Self {
+            sheet: Some(sheet),
+            lens: None,
+        }
+    }
+}
+
+impl DataSheetError {
+    pub(in crate::camera) fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> Self {
+        Self::Syntax {
+            path: path.to_owned(),
+            line: line_of(text, error.span()),
+            message: error.message().trim().to_owned(),
+        }
+    }
+}
+
 impl DataSheet {
     /// Reads a `camera.toml`. File names in it are relative to its directory.
     ///
@@ -140,22 +207,7 @@ impl DataSheet {
     /// [`DataSheetError`] with the file, the line and the key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataSheetError> {
         let path = path.as_ref();
-        let failed = |source| DataSheetError::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let file = files::open(path).map_err(failed)?;
-        let mut text = String::new();
-        file.take(MAX_BYTES + 1)
-            .read_to_string(&mut text)
-            .map_err(failed)?;
-        if text.len() as u64 > MAX_BYTES {
-            return Err(DataSheetError::TooLarge {
-                path: path.to_owned(),
-                limit: MAX_BYTES,
-            });
-        }
-        Self::parse(path, &text)
+        Self::parse(path, &text_of(path)?)
     }
 
     /// Parses the text of such a file; `path` is its name.
@@ -163,12 +215,7 @@ impl DataSheet {
     /// # Errors
     /// As [`Self::read`].
     pub fn parse(path: &Path, text: &str) -> Result<Self, DataSheetError> {
-        let table: Table = toml::from_str(text).map_err(|error| DataSheetError::Syntax {
-            path: path.to_owned(),
-            line: line_of(text, error.span()),
-            message: error.message().trim().to_owned(),
-        })?;
-        CameraFile { path, text, table }.data_sheet()
+        SheetFile::parse(path, text)?.data_sheet()
     }
 
     /// The first contradiction between values, if any.
@@ -208,14 +255,22 @@ impl DataSheet {
     }
 }
 
-/// A parsed TOML file.
-struct CameraFile<'a> {
+/// A parsed TOML file, without a lens.
+struct SheetFile<'a> {
     path: &'a Path,
     text: &'a str,
     table: Table,
 }
 
-impl CameraFile<'_> {
+impl<'a> SheetFile<'a> {
+    fn parse(path: &'a Path, text: &'a str) -> Result<Self, DataSheetError> {
+        let parsed = toml::from_str(text);
+        let mut table: Table =
+            parsed.map_err(|error| DataSheetError::syntax(path, text, &error))?;
+        table.retain(|key, _| key.get_ref() != LENS);
+        Ok(Self { path, text, table })
+    }
+
     fn data_sheet(&self) -> Result<DataSheet, DataSheetError> {
         self.check_names()?;
         let mut sheet = DataSheet {

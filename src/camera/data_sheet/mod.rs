@@ -22,7 +22,7 @@ mod sheet;
 mod spot_image;
 mod template;
 
-pub use file::DataSheetError;
+pub use file::{CameraDescription, DataSheetError};
 #[doc(hidden)]
 pub use imperfections::lens_transmission;
 pub use imperfections::{Imperfections, SpotForm};

@@ -5,7 +5,7 @@ use super::values;
 use crate::cli::exit::CommandError;
 use clap::{Args, ValueEnum};
 use starpipe::base::epoch::ObservationDate;
-use starpipe::camera::data_sheet::DataSheet;
+use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::pipeline::SolveOptions;
 use starpipe::sky::places::AttitudeFrame;
 use std::path::PathBuf;
@@ -40,9 +40,13 @@ pub(crate) struct HintOptions {
     #[arg(long, value_name = "DIRECTIONS", value_enum, default_value_t = FrameOf::Icrs)]
     frame_of: FrameOf,
     /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and
-    /// a predicted limiting magnitude for frames whose exposure is known
+    /// a predicted limiting magnitude for frames whose exposure is known. Its lens, where
+    /// `starpipe calibrate` has measured one, is held
     #[arg(long, value_name = "FILE.toml")]
     pub(crate) camera: Option<PathBuf>,
+    /// Fit the lens to each frame, although --camera has one that `starpipe calibrate` measured
+    #[arg(long, requires = "camera")]
+    refine_lens: bool,
 }
 
 /// Which directions an attitude refers to.
@@ -76,6 +80,7 @@ impl HintOptions {
         options.pixel_scale_arcsec = self.pixel_scale;
         options.near_deg = self.near.map(|near| [near.ra_deg, near.dec_deg]);
         options.date = self.date;
+        options.refine_lens = self.refine_lens;
         options.attitude_frame = self.frame_of.into();
         options.site = self.observer.site();
         options.velocity_km_s = self.observer.velocity_km_s();
@@ -85,8 +90,8 @@ impl HintOptions {
     }
 
     /// The camera, if one is given.
-    pub(crate) fn data_sheet(&self) -> anyhow::Result<Option<DataSheet>> {
-        let read = |path: &PathBuf| Ok(DataSheet::read(path)?);
+    pub(crate) fn description(&self) -> anyhow::Result<Option<CameraDescription>> {
+        let read = |path: &PathBuf| Ok(CameraDescription::read(path)?);
         self.camera.as_ref().map(read).transpose()
     }
 }

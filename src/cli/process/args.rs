@@ -11,7 +11,7 @@ use anyhow::Context as _;
 use clap::{Args, ValueEnum, value_parser};
 use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
 use starpipe::calibration::{Calibration, read_hot_pixels};
-use starpipe::camera::data_sheet::DataSheet;
+use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::detect::CentroidMethod;
 use starpipe::frame::PageChoice;
 use starpipe::pipeline::SolveOptions;
@@ -153,7 +153,7 @@ impl ProcessArgs {
     }
 
     pub(super) fn plan(&self) -> Result<Plan, CommandError> {
-        let camera = self.solving.hints.data_sheet()?;
+        let camera = self.solving.hints.description()?;
         Ok(Plan {
             options: self.options()?,
             calibration: self.calibration.read(camera.as_ref())?,
@@ -164,13 +164,17 @@ impl ProcessArgs {
 }
 
 impl CalibrationOptions {
-    /// Reads the calibration, if any is given. Without a dark, the bias is that of `sheet`.
-    pub(crate) fn read(&self, sheet: Option<&DataSheet>) -> anyhow::Result<Option<Calibration>> {
+    /// Reads the calibration, if any is given. Without a dark, the bias is that of the camera.
+    pub(crate) fn read(
+        &self,
+        camera: Option<&CameraDescription>,
+    ) -> anyhow::Result<Option<Calibration>> {
         if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
             return Ok(None);
         }
         let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
         let list = self.hot_pixels.as_deref().map(read_hot_pixels).transpose();
+        let sheet = camera.and_then(|camera| camera.sheet.as_ref());
         let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
         let calibration = Calibration::new(
             master(&self.dark)?,

@@ -11,7 +11,7 @@ use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
 use starpipe::calibration::Calibration;
-use starpipe::camera::data_sheet::DataSheet;
+use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Context, SolveOptions};
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 #[derive(Default)]
 pub(crate) struct Plan {
     pub(crate) options: SolveOptions,
-    pub(crate) camera: Option<DataSheet>,
+    pub(crate) camera: Option<CameraDescription>,
     pub(crate) calibration: Option<Calibration>,
     pub(crate) memory: MemoryLimit,
 }

@@ -10,7 +10,7 @@ use crate::camera::{
     CameraModel, Distortion, DistortionModel, LENS_TERMS, MAX_TERMS, MONOMIALS, Observed, monomials,
 };
 use multiversion::multiversion;
-use nalgebra::{Cholesky, Const, SMatrix, SVector, Vector3};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector, Vector3};
 
 /// A star with known direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub struct MeasuredStar {
 /// The standard error of an outlier (with an unresolved companion, for example) as it counts in a fit:
 /// it grows with the residual, so that it pulls no harder than other stars (Huber 1964, Ann. Math. Stat.
 /// 35, 73).
-pub(super) fn robust_sigma_px(sigma_px: f64, residual_px: f64) -> f64 {
+pub(crate) fn robust_sigma_px(sigma_px: f64, residual_px: f64) -> f64 {
     /// Residual in standard errors beyond which a star pulls no harder.
     const HUBER_SIGMAS: f64 = 2.5;
     let excess = residual_px / (HUBER_SIGMAS * sigma_px);
@@ -67,8 +67,18 @@ pub(super) struct Adjustment<'a, const P: usize> {
     predictor: Predictor,
     /// The terms that are fitted.
     model: Option<DistortionModel>,
-    /// Where the axis is, if it is known.
-    axis_px: Option<[f64; 2]>,
+    prior: Prior<'a>,
+}
+
+/// What is known of a lens before it is fitted.
+#[derive(Clone, Copy)]
+pub(super) enum Prior<'a> {
+    /// What lenses are like.
+    Usual,
+    /// The same, and where the axis meets the frame.
+    Axis([f64; 2]),
+    /// A lens that was measured, with this information (inverse covariance) on ln f and the terms.
+    Known(&'a CameraModel, &'a DMatrix<f64>),
 }
 
 /// The two equations of several stars, divided by their standard errors. The unknowns are a turn, the
@@ -192,6 +202,30 @@ impl Predictor {
         predictor
     }
 
+    /// Turns the camera, and changes ln f and the terms of `model`.
+    pub fn change(
+        &mut self,
+        turn: Vector3<f64>,
+        ln_ratio: f64,
+        changes_px: impl IntoIterator<Item = f64>,
+        model: Option<DistortionModel>,
+    ) {
+        self.icrs_to_lens = self.icrs_to_lens.then_turn(turn);
+        let focal_length_px = self.camera.focal_length_px() * ln_ratio.exp();
+        self.set_lens(focal_length_px, self.distortion.changed(changes_px), model);
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// The attitude.
+    pub fn icrs_to_camera(&self) -> Rotation<Icrs, Camera> {
+        let to_camera = self.camera.lens_axes().transpose();
+        Rotation::from_matrix(to_camera * self.icrs_to_lens.matrix())
+    }
+
     /// Sets the lens, with the terms of `model` alone, and leaves its axes.
     fn set_lens(
         &mut self,
@@ -239,13 +273,19 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             stars,
             predictor: Predictor::new(camera, icrs_to_camera, model),
             model,
-            axis_px: None,
+            prior: Prior::Usual,
         }
     }
 
     /// The same with the axis that the camera has.
     pub fn with_known_axis(mut self) -> Self {
-        self.axis_px = Some(self.predictor.distortion.axis_offset_px());
+        self.prior = Prior::Axis(self.predictor.distortion.axis_offset_px());
+        self
+    }
+
+    /// The same with a lens that was measured before.
+    pub fn with_known_lens(mut self, lens: &'a CameraModel, information: &'a DMatrix<f64>) -> Self {
+        self.prior = Prior::Known(lens, information);
         self
     }
 
@@ -256,12 +296,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
 
     /// The attitude.
     pub fn icrs_to_camera(&self) -> Rotation<Icrs, Camera> {
-        let Predictor {
-            camera,
-            icrs_to_lens,
-            ..
-        } = &self.predictor;
-        Rotation::from_matrix(camera.lens_axes().tr_mul(icrs_to_lens.matrix()))
+        self.predictor.icrs_to_camera()
     }
 
     /// The equations of [`LANES`] stars, or fewer. `None` if one is not imaged.
@@ -319,17 +354,12 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             SMatrix::<f64, P, P>::from_fn(|i, j| total(&sums.block[i.max(j)][i.min(j)]));
         let mut vector = SVector::<f64, P>::from_fn(|i, _| total(&sums.vector[i]));
         let mut misfit = total(&sums.misfit);
-        let distortion = &self.predictor.distortion;
-        for (term, known_px) in distortion.coefficients_px()[..P - POSE_PARAMETERS]
-            .iter()
-            .enumerate()
-        {
-            let (expected_px, sigma_px) = self.usual(term);
-            let parameter = POSE_PARAMETERS + term;
-            block[(parameter, parameter)] += sigma_px.powi(-2);
-            vector[parameter] += expected_px * sigma_px.powi(-2);
-            misfit += ((known_px - expected_px) / sigma_px).powi(2);
-        }
+        misfit += match self.prior {
+            Prior::Known(lens, information) => {
+                self.add_known(lens, information, &mut block, &mut vector)
+            }
+            Prior::Usual | Prior::Axis(_) => self.add_usual(&mut block, &mut vector),
+        };
         Some(Normal {
             root: block.cholesky()?,
             vector,
@@ -337,22 +367,55 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         })
     }
 
-    /// Mean and standard deviation of a term of lenses in general, in pixels.
-    fn usual(&self, term: usize) -> (f64, f64) {
-        /// Standard deviation of an axis that is known, in pixels.
-        const KNOWN_PX: f64 = 0.01;
-        let radius_px = self.predictor.distortion.radius_px();
-        let of_axis = term.checked_sub(AXIS).filter(|along| *along < 2);
-        match (of_axis, self.axis_px) {
-            (Some(along), Some(axis_px)) => (axis_px[along], KNOWN_PX),
-            (Some(_), None) if !self.predictor.camera.is_pinhole() => {
-                (0.0, USUAL_AXIS_OF_FISHEYE * radius_px)
-            }
-            _ => {
-                let usual = USUAL_TERMS.get(term).unwrap_or(&USUAL_MONOMIAL);
-                (0.0, usual * radius_px)
+    /// Adds what lenses are like; returns how unusual the present one is.
+    fn add_usual(&self, block: &mut SMatrix<f64, P, P>, vector: &mut SVector<f64, P>) -> f64 {
+        let axis_px = match self.prior {
+            Prior::Axis(axis_px) => Some(axis_px),
+            _ => None,
+        };
+        let terms_px = &self.predictor.distortion.coefficients_px()[..P - POSE_PARAMETERS];
+        let mut misfit = 0.0;
+        for (term, known_px) in terms_px.iter().enumerate() {
+            let (expected_px, sigma_px) = usual_term_px(&self.predictor.camera, axis_px, term);
+            let parameter = POSE_PARAMETERS + term;
+            block[(parameter, parameter)] += sigma_px.powi(-2);
+            vector[parameter] += expected_px * sigma_px.powi(-2);
+            misfit += ((known_px - expected_px) / sigma_px).powi(2);
+        }
+        misfit
+    }
+
+    /// Adds what is known of this lens; returns how far the present one is from it.
+    fn add_known(
+        &self,
+        lens: &CameraModel,
+        information: &DMatrix<f64>,
+        block: &mut SMatrix<f64, P, P>,
+        vector: &mut SVector<f64, P>,
+    ) -> f64 {
+        const FIRST: usize = POSE_PARAMETERS - 1;
+        let expected_px = lens
+            .distortion()
+            .map_or(&[][..], Distortion::coefficients_px);
+        let present_px = self.predictor.distortion.coefficients_px();
+        let ln_ratio = (lens.focal_length_px() / self.predictor.camera.focal_length_px()).ln();
+        // The unknowns: a change of ln f, and terms.
+        let wanted: DVector<f64> = DVector::from_iterator(
+            information.nrows(),
+            std::iter::once(ln_ratio).chain(expected_px.iter().copied()),
+        );
+        let mut off = wanted.clone();
+        for (off, present_px) in off.iter_mut().skip(1).zip(present_px) {
+            *off -= present_px;
+        }
+        let pull = information * &wanted;
+        for i in 0..information.nrows().min(P - FIRST) {
+            vector[FIRST + i] += pull[i];
+            for j in 0..information.ncols().min(P - FIRST) {
+                block[(FIRST + i, FIRST + j)] += information[(i, j)];
             }
         }
+        off.dot(&(information * &off))
     }
 
     /// Gauss-Newton steps, shortened where a whole one makes the fit worse or steps go to and fro, until a step moves the
@@ -409,15 +472,12 @@ impl<'a, const P: usize> Adjustment<'a, P> {
 
     /// Changes the parameters by a share of `change`.
     fn take(&mut self, change: &SVector<f64, P>, share: f64) {
-        let predictor = &mut self.predictor;
         let turn = Vector3::new(change[0], change[1], change[2]) * share;
-        predictor.icrs_to_lens = predictor.icrs_to_lens.then_turn(turn);
-        let focal_length_px = predictor.camera.focal_length_px() * (share * change[3]).exp();
-        let changes = change.iter().skip(POSE_PARAMETERS);
-        let distortion = predictor
-            .distortion
-            .changed(changes.map(|change| share * change));
-        predictor.set_lens(focal_length_px, distortion, self.model);
+        let changes_px = change.iter().skip(POSE_PARAMETERS);
+        let changes_px = changes_px.map(|change| share * change);
+        let model = self.model;
+        self.predictor
+            .change(turn, share * change[3], changes_px, model);
     }
 
     /// Observed minus predicted position of [`LANES`] stars or fewer. `None` if one is not imaged.
@@ -432,6 +492,26 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             }
         }
         Some(residuals_px)
+    }
+}
+
+/// Mean and standard deviation of a term of lenses in general, in pixels; with the axis where it is known.
+pub(super) fn usual_term_px(
+    camera: &CameraModel,
+    axis_px: Option<[f64; 2]>,
+    term: usize,
+) -> (f64, f64) {
+    /// Standard deviation of an axis that is known, in pixels.
+    const KNOWN_PX: f64 = 0.01;
+    let radius_px = camera.radius_px();
+    let of_axis = term.checked_sub(AXIS).filter(|along| *along < 2);
+    match (of_axis, axis_px) {
+        (Some(along), Some(axis_px)) => (axis_px[along], KNOWN_PX),
+        (Some(_), None) if !camera.is_pinhole() => (0.0, USUAL_AXIS_OF_FISHEYE * radius_px),
+        _ => {
+            let usual = USUAL_TERMS.get(term).unwrap_or(&USUAL_MONOMIAL);
+            (0.0, usual * radius_px)
+        }
     }
 }
 

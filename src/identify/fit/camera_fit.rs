@@ -5,7 +5,7 @@
 
 use super::adjustment::{Adjustment, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
-use crate::camera::{CameraModel, Distortion, DistortionModel};
+use crate::camera::{CameraModel, Distortion, DistortionModel, KnownLens};
 use nalgebra::{Matrix4, SMatrix, Vector4};
 
 /// Result of the fit.
@@ -25,6 +25,8 @@ pub struct CameraFit {
     pub stars: usize,
 }
 
+/// Parameters that are free where the lens is known.
+const ATTITUDE_PARAMETERS: usize = 3;
 /// The fit has converged where a step moves the predicted places by less than this, in standard errors.
 const CONVERGED: f64 = 1e-3;
 
@@ -86,6 +88,46 @@ pub fn fit_camera(
             }
         }
     }
+}
+
+/// Fits the attitude, and a lens that is known but for its errors, starting from `icrs_to_camera`. Sets
+/// `residuals_px` as [`fit_camera`]; `None` for the same reasons.
+pub fn fit_known_lens(
+    stars: &[MeasuredStar],
+    lens: &KnownLens,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    residuals_px: &mut Vec<[f64; 2]>,
+) -> Option<CameraFit> {
+    use DistortionModel::{
+        BrownConrady, Irregular3, Irregular5, Radial, Radial5, Radial7, Stretched,
+    };
+    let (camera, information) = (lens.camera(), lens.information());
+    macro_rules! fit {
+        ($terms:expr) => {
+            Adjustment::<{ POSE_PARAMETERS + $terms }>::new(
+                stars,
+                camera,
+                icrs_to_camera,
+                camera.distortion_model(),
+            )
+            .with_known_lens(camera, information)
+            .fit(residuals_px)
+        };
+    }
+    let fit = match camera.distortion_model() {
+        None => fit!(0),
+        Some(Radial) => fit!(Radial.terms()),
+        Some(Radial5) => fit!(Radial5.terms()),
+        Some(Radial7) => fit!(Radial7.terms()),
+        Some(BrownConrady) => fit!(BrownConrady.terms()),
+        Some(Stretched) => fit!(Stretched.terms()),
+        Some(Irregular3) => fit!(Irregular3.terms()),
+        Some(Irregular5) => fit!(Irregular5.terms()),
+    }?;
+    Some(CameraFit {
+        parameters: ATTITUDE_PARAMETERS,
+        ..fit
+    })
 }
 
 impl<const P: usize> Adjustment<'_, P> {

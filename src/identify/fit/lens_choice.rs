@@ -21,7 +21,7 @@ const WORTH_MONOMIALS: f64 = 12.0;
 const WORTH_A_PROJECTION: f64 = 6.0;
 /// Angle from the boresight to the corners above which projections are compared, in radians. In
 /// narrower fields the term r³ is all by which they differ.
-const WIDE_RAD: f64 = 0.3;
+pub(crate) const WIDE_RAD: f64 = 0.3;
 /// So many times more is needed where the stars do not determine the model as far as the corners:
 /// one in 4000 first terms gains that by chance.
 const WORTH_A_GUESS: f64 = 4.5;
@@ -141,7 +141,7 @@ impl LensChoice<'_> {
             } else if largest_px > pinhole_px {
                 continue;
             }
-            let penalty = if is_pinhole { 0.0 } else { WORTH_A_PROJECTION };
+            let penalty = worth_a_projection(projection);
             if best.is_none_or(|(least, _)| misfit + penalty < least) {
                 best = Some((misfit + penalty, Lens { projection, model }));
             }
@@ -253,7 +253,7 @@ pub fn depend_on_place(
 }
 
 /// The gain in likelihood over a simpler model that a model needs.
-fn least_gain(model: DistortionModel, simpler: Option<DistortionModel>) -> f64 {
+pub(crate) fn least_gain(model: DistortionModel, simpler: Option<DistortionModel>) -> f64 {
     if model >= DistortionModel::Irregular3 {
         return WORTH_MONOMIALS + least_gain(DistortionModel::Stretched, simpler).max(0.0);
     }
@@ -261,8 +261,16 @@ fn least_gain(model: DistortionModel, simpler: Option<DistortionModel>) -> f64 {
     WORTH_A_TERM * (model.terms() as f64 - terms as f64)
 }
 
+/// The gain in likelihood that a projection needs.
+pub(crate) fn worth_a_projection(projection: Projection) -> f64 {
+    match projection {
+        Projection::Pinhole => 0.0,
+        _ => WORTH_A_PROJECTION,
+    }
+}
+
 /// Whether there are stars enough for a model.
-pub fn is_affordable(model: DistortionModel, stars: usize) -> bool {
+pub(crate) fn is_affordable(model: DistortionModel, stars: usize) -> bool {
     2.0 * stars as f64 >= EQUATIONS_PER_PARAMETER * (model.terms() + POSE_PARAMETERS) as f64
 }
 

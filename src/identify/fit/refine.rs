@@ -5,16 +5,17 @@
 
 use super::adjustment::robust_sigma_px;
 use super::lens_choice::{Lens, LensChoice, depend_on_place, is_affordable, with_projection};
-use super::{CameraFit, MeasuredStar, fit_camera};
+use super::{CameraFit, MeasuredStar, fit_camera, fit_known_lens};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::statistics::median;
-use crate::camera::{CameraModel, DistortionModel};
-use crate::identify::field::{ObservedStar, Photometry};
+use crate::camera::{CameraModel, DistortionModel, KnownLens};
+use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::naming::{Blends, Candidate, Naming, Stars};
 use crate::identify::pairing::{Pair, Pairing};
 use crate::identify::predict::{PredictedStar, Surroundings};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Largest distance of a pair, in typical errors on one axis.
 const CLIP_SIGMAS: f64 = 5.0;
@@ -119,6 +120,7 @@ pub struct Refiner {
     stars: Vec<MeasuredStar>,
     residuals_px: Vec<[f64; 2]>,
     scratch: Scratch,
+    lens: Option<Arc<KnownLens>>,
 }
 
 /// Buffers for medians.
@@ -137,6 +139,17 @@ impl Scratch {
 }
 
 impl Refiner {
+    /// From the next refinement on, this lens is known, in fields of its size.
+    pub fn set_known_lens(&mut self, lens: Option<&Arc<KnownLens>>) {
+        self.lens = lens.cloned();
+    }
+
+    /// The lens that is known of a field.
+    fn known_lens(&self, field: &StarField) -> Option<&Arc<KnownLens>> {
+        let is_of_field = |lens: &&Arc<KnownLens>| lens.is_of_size(field.width_px, field.height_px);
+        self.lens.as_ref().filter(is_of_field)
+    }
+
     /// Pairs and fits in turn from `start`; [`Self::pairs`] are then the stars that agree. `None`
     /// if too few agree to determine the camera.
     pub fn refine(&mut self, problem: Problem, start: &Start) -> Option<Refined> {
@@ -324,17 +337,10 @@ impl Refiner {
     /// The fit to the pairs, from `guess`.
     fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
         self.measure(problem, guess.excess_sigma_px);
-        let model = guess.lens.model;
-        let affordable = model.filter(|m| is_affordable(*m, self.stars.len()));
-        let (camera, icrs_to_camera) = guess.start();
-        let residuals_px = &mut self.residuals_px;
-        let fit = fit_camera(
-            &self.stars,
-            &camera,
-            &icrs_to_camera,
-            affordable,
-            residuals_px,
-        )?;
+        let fit = match self.known_lens(problem.field).cloned() {
+            Some(lens) => self.fit_known_lens(&lens, guess.hypothesis),
+            None => self.fit_lens(guess),
+        }?;
         let excess_sigma_px = self.excess_sigma_of(problem, fit.parameters);
         for (pair, [x, y]) in self.pairs.iter_mut().zip(&self.residuals_px) {
             pair.residual_px = (x * x + y * y).sqrt();
@@ -344,6 +350,29 @@ impl Refiner {
             zero_point_mag: self.zero_point_mag(problem),
             excess_sigma_px,
         })
+    }
+
+    /// The fit of a lens to the stars.
+    fn fit_lens(&mut self, guess: &Guess) -> Option<CameraFit> {
+        let model = guess.lens.model;
+        let affordable = model.filter(|m| is_affordable(*m, self.stars.len()));
+        let (camera, icrs_to_camera) = guess.start();
+        let residuals_px = &mut self.residuals_px;
+        fit_camera(
+            &self.stars,
+            &camera,
+            &icrs_to_camera,
+            affordable,
+            residuals_px,
+        )
+    }
+
+    fn fit_known_lens(&mut self, lens: &KnownLens, guess: &Hypothesis) -> Option<CameraFit> {
+        if lens.camera().mirrored != guess.camera.mirrored {
+            return None;
+        }
+        let attitude = lens.attitude_like(&guess.camera, &guess.icrs_to_camera)?;
+        fit_known_lens(&self.stars, lens, &attitude, &mut self.residuals_px)
     }
 
     /// The median difference between catalogue and observed magnitudes.
@@ -381,6 +410,9 @@ impl Refiner {
         current: &Refined,
         richest: DistortionModel,
     ) -> Lens {
+        if self.known_lens(problem.field).is_some() {
+            return Lens::of(&current.fit.camera);
+        }
         self.measure(problem, current.excess_sigma_px);
         let mut choice = LensChoice {
             field: problem.field,

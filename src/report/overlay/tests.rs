@@ -60,6 +60,7 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
     let boresight = UnitVector::from_ra_dec(80.0 * RAD_PER_DEG, 30.0 * RAD_PER_DEG);
     Outcome::Identified(Box::new(Identification {
         places: StarPlaces::default(),
+        lens_is_known: false,
         camera: CameraModel::pinhole(WIDTH as f64, HEIGHT as f64, 3000.0, mirrored),
         icrs_to_camera: Rotation::looking_at(&boresight, up_deg * RAD_PER_DEG),
         attitude_covariance_rad2: Matrix3::identity() * 1e-10,

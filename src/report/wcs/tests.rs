@@ -94,6 +94,7 @@ impl Wcs {
 fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
     let identification = Identification {
         places: StarPlaces::default(),
+        lens_is_known: false,
         camera,
         icrs_to_camera: attitude,
         attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),

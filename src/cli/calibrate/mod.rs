@@ -1,0 +1,160 @@
+//! `calibrate`: measures the lens of a camera in several of its frames.
+
+mod figure;
+mod lens_file;
+
+use super::exit::{CommandError, Exit, Outcome};
+use super::input::frames::FrameList;
+use super::options::catalog::CatalogOptions;
+use super::options::format::PageFormat;
+use super::options::frames::{FrameOptions, MemoryOption};
+use super::options::hints::HintOptions;
+use super::output::files::write_whole;
+use super::output::messages::report_error;
+use super::output::rows::json_line;
+use super::plot::PlotFile;
+use super::process::CalibrationOptions;
+use super::progress::frames_bar;
+use super::solving::{Inputs, Plan, Sink, Solved, Solver};
+use clap::Args;
+use starpipe::frame::{ImageName, PageChoice};
+use starpipe::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
+use starpipe::report::LensReport;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe calibrate night/ -o camera.toml\n  \
+    starpipe calibrate --site 52.22,4.42 --camera camera.toml night/*.fits -o camera.toml --force\n  \
+    starpipe process --camera camera.toml night.fits\n\n\
+    Twenty frames or more, whose stars are spread over the whole frame, measure a lens well. `process`, `track` and\n\
+    `identify` hold the lens that is in the file given with --camera.")]
+pub(crate) struct CalibrateArgs {
+    #[command(flatten)]
+    frames: FrameOptions,
+    #[command(flatten)]
+    calibration: CalibrationOptions,
+    #[command(flatten)]
+    memory: MemoryOption,
+    #[command(flatten)]
+    hints: HintOptions,
+    /// File for the lens: the description given with --camera, if any, with a table [lens]
+    #[arg(short, long, value_name = "FILE.toml")]
+    out: Option<PathBuf>,
+    /// Overwrite the file
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Figure of the stars over the frame, and of their residuals
+    #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
+    plot: Option<PlotFile>,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = PageFormat::Text)]
+    format: PageFormat,
+    #[command(flatten)]
+    catalog: CatalogOptions,
+}
+
+/// `starpipe calibrate`
+pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandError> {
+    lens_file::check(&arguments)?;
+    let plan = arguments.plan()?;
+    let (paths, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
+    let (frames, left_out, unread) = solve(&arguments, &plan, &paths)?;
+    if unread == paths.len() {
+        return Ok(Exit::Failure.into());
+    }
+    let measured = measure(frames, left_out).map_err(anyhow::Error::from)?;
+    write(&arguments, &measured)?;
+    let report = LensReport::new(&measured);
+    let has_failed = failed || unread > 0;
+    Ok(Outcome {
+        text: match arguments.format {
+            PageFormat::Text => report.to_text(),
+            PageFormat::Json => json_line(&report)?,
+        },
+        exit: match measured.left_out.is_empty() {
+            _ if has_failed => Exit::Failure,
+            true => Exit::Success,
+            false => Exit::NotIdentified,
+        },
+    })
+}
+
+impl CalibrateArgs {
+    fn plan(&self) -> Result<Plan, CommandError> {
+        let camera = self.hints.description()?;
+        let mut options = self.hints.options()?;
+        // The lens is what is to be measured.
+        options.refine_lens = true;
+        Ok(Plan {
+            options,
+            calibration: self.calibration.read(camera.as_ref())?,
+            camera,
+            memory: self.memory.limit(),
+        })
+    }
+}
+
+/// The stars of a frame, or why it is left out.
+type Taken = Result<LensFrame, LeftOutFrame>;
+
+/// Takes the stars of frames.
+struct Stars;
+
+impl Sink for Stars {
+    type Made = Taken;
+
+    fn make(&self, image: &ImageName, solved: &Solved) -> Taken {
+        let name = image.to_string();
+        LensFrame::new(&name, &solved.solution).map_err(|why| LeftOutFrame { name, why })
+    }
+}
+
+/// The frames with their stars, those that are left out, and the number of files that are no frames.
+fn solve(
+    arguments: &CalibrateArgs,
+    plan: &Plan,
+    paths: &[PathBuf],
+) -> Result<(Vec<LensFrame>, Vec<LeftOutFrame>, usize), CommandError> {
+    let progress = frames_bar(paths.len() as u64);
+    let (mut frames, mut left_out, mut unread) = (Vec::new(), Vec::new(), 0);
+    arguments.catalog.with_index(|pool, indexed| {
+        let solver = Solver {
+            pool,
+            inputs: &Inputs::Frames(PageChoice::default()),
+            context: plan.context(indexed),
+            memory: plan.memory,
+            sink: Stars,
+        };
+        solver.solve_all(paths, |images| {
+            progress.inc(1);
+            for (_, taken) in images {
+                match taken {
+                    Ok(Ok(frame)) => frames.push(frame),
+                    Ok(Err(unfit)) => left_out.push(unfit),
+                    Err(error) => {
+                        unread += 1;
+                        progress.suspend(|| report_error(error.as_ref()));
+                    }
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        Ok(())
+    })?;
+    progress.finish_and_clear();
+    Ok((frames, left_out, unread))
+}
+
+fn write(arguments: &CalibrateArgs, measured: &LensCalibration) -> Result<(), CommandError> {
+    let mut files = Vec::new();
+    if let Some(path) = &arguments.out {
+        let text = lens_file::text(arguments.hints.camera.as_deref(), measured)?;
+        files.push((path.clone(), text.into_bytes()));
+    }
+    if let Some(plot) = &arguments.plot {
+        files.push(plot.with(&figure::sheet(measured))?);
+    }
+    Ok(write_whole(&files)?)
+}

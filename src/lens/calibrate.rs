@@ -1,0 +1,335 @@
+//! The calibration: frames are sorted out, the lens is chosen and fitted.
+
+use super::coverage::Coverage;
+use super::cross_validation::best_lens;
+use super::frames::{LeftOutFrame, LensFrame, Unfit};
+use super::mount::Mount;
+use super::scale_drift::{FrameScale, ScaleDrift};
+use crate::base::statistics::median;
+use crate::camera::{CameraModel, KnownLens};
+use crate::identify::fit::{JointFit, JointFrame, fit_jointly, robust_sigma_px};
+use std::f64::consts::LN_2;
+
+/// Rounds of fitting with the errors that the last residuals show.
+const ROUNDS: usize = 5;
+/// The relative difference of focal lengths at which a frame is of another lens.
+const OTHER_FOCAL_LENGTH: f64 = 0.01;
+/// The median distance of a frame's stars, over that of all frames, at which the lens misses them.
+const MISFIT: f64 = 2.0;
+/// The least such distance, in pixels.
+const MISFIT_PX: f64 = 0.1;
+
+/// Why no lens is measured.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// No frame is identified.
+    #[error("none of the frames is identified, so no lens can be measured")]
+    NoFrame,
+    /// The stars do not determine a lens.
+    #[error("the {stars} stars of {frames} frames do not determine a lens")]
+    NotDetermined {
+        /// Their stars.
+        stars: usize,
+        /// Frames that could be used.
+        frames: usize,
+    },
+}
+
+/// A lens that was measured in several frames.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct LensCalibration {
+    /// The lens, known as far as there are stars.
+    pub lens: KnownLens,
+    /// The frames that it was measured in.
+    pub frames: Vec<UsedFrame>,
+    /// Frames that are left out.
+    pub left_out: Vec<LeftOutFrame>,
+    /// Number of stars.
+    pub stars: usize,
+    /// Standard deviation of their residuals on each axis, in pixels, from the median.
+    pub rms_px: f64,
+    /// The same of stars that a fit leaves out.
+    pub held_out_rms_px: f64,
+    /// Error on each axis, in pixels, that the errors of the centroids do not explain.
+    pub excess_sigma_px: f64,
+    /// Where in the frame the stars are, and their residuals there.
+    pub coverage: Coverage,
+    /// Change of the scale over time; without dates of two frames or more there is none.
+    pub drift: Option<ScaleDrift>,
+    /// How the camera stands, if it did not move, and site and time are known.
+    pub mount: Option<Mount>,
+}
+
+/// A frame that a lens was measured in.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct UsedFrame {
+    /// Its name.
+    pub name: String,
+    /// Number of its stars.
+    pub stars: usize,
+    /// Standard deviation of their residuals on each axis, in pixels, from the median.
+    pub rms_px: f64,
+    /// Its scale relative to that of the lens, less 1.
+    pub scale: FrameScale,
+}
+
+/// Measures the lens of the camera of `frames`; `left_out` are frames that were not identified.
+///
+/// # Errors
+/// [`CalibrateError`] if there are too few stars.
+pub fn calibrate(
+    frames: Vec<LensFrame>,
+    left_out: Vec<LeftOutFrame>,
+) -> Result<LensCalibration, CalibrateError> {
+    let mut left_out = left_out;
+    let mut frames = alike(frames, &mut left_out);
+    if frames.is_empty() {
+        return Err(CalibrateError::NoFrame);
+    }
+    loop {
+        let not_determined = CalibrateError::NotDetermined {
+            stars: frames.iter().map(LensFrame::stars).sum(),
+            frames: frames.len(),
+        };
+        let fitted = Fitted::new(&frames).ok_or(not_determined.clone())?;
+        let misfits = fitted.misfits();
+        if misfits.is_empty() {
+            return fitted.calibration(frames, left_out).ok_or(not_determined);
+        }
+        for (number, why) in misfits.into_iter().rev() {
+            let name = frames.remove(number).name;
+            left_out.push(LeftOutFrame { name, why });
+        }
+    }
+}
+
+/// The frames that most others are like in size and focal length.
+fn alike(frames: Vec<LensFrame>, left_out: &mut Vec<LeftOutFrame>) -> Vec<LensFrame> {
+    let kinds: Vec<_> = frames.iter().map(LensFrame::kind).collect();
+    let alike =
+        |kind: &(u64, u64, bool)| frames.iter().filter(|frame| frame.kind() == *kind).count();
+    // Of equally frequent ones the first.
+    let Some(&kind) = kinds.iter().rev().max_by_key(|kind| alike(kind)) else {
+        return frames;
+    };
+    let focal_px = |frame: &LensFrame| frame.camera.central_focal_length_px();
+    let of_kind = frames.iter().filter(|frame| frame.kind() == kind);
+    let mut focal_lengths_px: Vec<f64> = of_kind.map(focal_px).collect();
+    let expected_px = median(&mut focal_lengths_px);
+    let mut kept = Vec::new();
+    for frame in frames {
+        let found_px = focal_px(&frame);
+        let why = if frame.kind() != kind {
+            let named = |(width, height, mirrored): (u64, u64, bool)| {
+                format!(
+                    "{width} x {height} px{}",
+                    if mirrored { ", mirrored" } else { "" }
+                )
+            };
+            Unfit::OtherSize {
+                found: named(frame.kind()),
+                expected: named(kind),
+            }
+        } else if (found_px / expected_px - 1.0).abs() > OTHER_FOCAL_LENGTH {
+            Unfit::OtherFocalLength {
+                found_px,
+                expected_px,
+            }
+        } else {
+            kept.push(frame);
+            continue;
+        };
+        left_out.push(LeftOutFrame {
+            name: frame.name,
+            why,
+        });
+    }
+    kept
+}
+
+/// A lens fitted to frames.
+struct Fitted {
+    fit: JointFit,
+    excess_sigma_px: f64,
+    held_out_rms_px: f64,
+    /// Median distance of the stars of each frame, in pixels.
+    distances_px: Vec<f64>,
+}
+
+impl Fitted {
+    fn new(frames: &[LensFrame]) -> Option<Self> {
+        let stated: Vec<JointFrame> = frames.iter().map(|frame| frame.joint.clone()).collect();
+        let richest = frames
+            .iter()
+            .max_by_key(|frame| (frame.stars(), frame.camera.distortion_model()))?;
+        let start = richest.camera;
+        // Residuals tell the errors, and these weigh the stars for the choice of a lens.
+        let first = fit_jointly(&stated, &start, start.distortion_model())?;
+        let excess_sigma_px = excess_sigma_px(&stated, &first);
+        let weighted = weighted(&stated, &first, excess_sigma_px);
+        let tested = best_lens(&weighted, &first.camera)?;
+        let mut fit = fit_jointly(
+            &weighted,
+            &first.camera.reprojected(tested.projection),
+            tested.model,
+        )?;
+        let mut excess_sigma_px = excess_sigma_px;
+        for _ in 0..ROUNDS {
+            excess_sigma_px = self::excess_sigma_px(&stated, &fit);
+            let weighted = self::weighted(&stated, &fit, excess_sigma_px);
+            fit = fit_jointly(&weighted, &fit.camera, tested.model)?;
+        }
+        let distances_px = fit.residuals_px.iter().map(|residuals| {
+            let mut distances: Vec<f64> = residuals.iter().map(|[x, y]| x.hypot(*y)).collect();
+            median(&mut distances)
+        });
+        Some(Self {
+            excess_sigma_px,
+            held_out_rms_px: tested.rms_px,
+            distances_px: distances_px.collect(),
+            fit,
+        })
+    }
+
+    /// The frames whose stars the lens misses, with the reason.
+    fn misfits(&self) -> Vec<(usize, Unfit)> {
+        let expected_px = median(&mut self.distances_px.clone());
+        let limit_px = (MISFIT * expected_px).max(MISFIT_PX);
+        let frames = self.distances_px.iter().enumerate();
+        let missed = frames.filter(|(_, found_px)| **found_px > limit_px);
+        missed
+            .map(|(number, &found_px)| {
+                (
+                    number,
+                    Unfit::Misfit {
+                        found_px,
+                        expected_px,
+                    },
+                )
+            })
+            .collect()
+    }
+
+    fn calibration(
+        self,
+        frames: Vec<LensFrame>,
+        left_out: Vec<LeftOutFrame>,
+    ) -> Option<LensCalibration> {
+        let Self {
+            fit,
+            excess_sigma_px,
+            held_out_rms_px,
+            ..
+        } = self;
+        let attitudes = fit.attitudes.iter().copied();
+        let frames: Vec<LensFrame> = frames
+            .into_iter()
+            .zip(attitudes)
+            .map(|(frame, attitude)| frame.with_attitude(attitude))
+            .collect();
+        let camera = limited(&fit.camera, &frames);
+        let used = frames
+            .iter()
+            .zip(&fit.residuals_px)
+            .map(|(frame, residuals)| UsedFrame {
+                name: frame.name.clone(),
+                stars: frame.stars(),
+                rms_px: rms_px(residuals.iter()),
+                scale: FrameScale::of(frame, &fit.camera, excess_sigma_px),
+            });
+        let used: Vec<UsedFrame> = used.collect();
+        let dated = frames.iter().zip(&used).filter_map(|(frame, used)| {
+            let years = frame.date?.years_since_j2000();
+            Some((years, used.scale))
+        });
+        Some(LensCalibration {
+            coverage: Coverage::new(&camera, &frames, &fit.residuals_px),
+            drift: ScaleDrift::of(&dated.collect::<Vec<_>>()),
+            mount: Mount::of(&frames),
+            stars: frames.iter().map(LensFrame::stars).sum(),
+            rms_px: rms_px(fit.residuals_px.iter().flatten()),
+            lens: KnownLens::new(camera, fit.covariance)?,
+            frames: used,
+            left_out,
+            held_out_rms_px,
+            excess_sigma_px,
+        })
+    }
+}
+
+/// The camera, known as far from the axis as there are stars.
+fn limited(camera: &CameraModel, frames: &[LensFrame]) -> CameraModel {
+    /// As many stars at least are as far from the axis.
+    const OUTERMOST: usize = 5;
+    /// A lens that is known so far of the way to the corners is known up to them.
+    const NEARLY: f64 = 0.95;
+    let axis = camera.direction_of(&camera.axis());
+    let angles = frames
+        .iter()
+        .flat_map(|frame| &frame.joint.stars)
+        .filter_map(|star| {
+            let direction = camera.direction_of(&star.pixel)?;
+            Some(direction.angle_to(axis.as_ref()?))
+        });
+    let mut angles_rad: Vec<f64> = angles.collect();
+    angles_rad.sort_by(|a, b| b.total_cmp(a));
+    let known_rad = angles_rad.get(OUTERMOST.min(angles_rad.len().saturating_sub(1)));
+    let corners = camera.corners();
+    let corners_rad = corners
+        .iter()
+        .filter_map(|corner| Some(camera.direction_of(corner)?.angle_to(axis.as_ref()?)));
+    let corner_rad = corners_rad.fold(0.0, f64::max);
+    match known_rad {
+        Some(known_rad) if corner_rad == 0.0 || *known_rad < NEARLY * corner_rad => {
+            camera.limited_to(*known_rad)
+        }
+        _ => *camera,
+    }
+}
+
+/// Standard deviation of residuals on each axis, from their median distance.
+fn rms_px<'a>(residuals: impl Iterator<Item = &'a [f64; 2]>) -> f64 {
+    let mut squares: Vec<f64> = residuals.map(|[x, y]| x * x + y * y).collect();
+    (median(&mut squares) / (2.0 * LN_2)).sqrt()
+}
+
+/// The stars with errors that explain the residuals of `fit`; outliers have larger ones.
+fn weighted(stated: &[JointFrame], fit: &JointFit, excess_sigma_px: f64) -> Vec<JointFrame> {
+    let frames = stated.iter().zip(&fit.attitudes).zip(&fit.residuals_px);
+    let weighted = frames.map(|((frame, attitude), residuals)| {
+        let mut frame = frame.clone();
+        frame.icrs_to_camera = *attitude;
+        for (star, [x, y]) in frame.stars.iter_mut().zip(residuals) {
+            let sigma_px = star.sigma_px.hypot(excess_sigma_px);
+            star.sigma_px = robust_sigma_px(sigma_px, x.hypot(*y));
+        }
+        frame
+    });
+    weighted.collect()
+}
+
+/// The error on each axis that the stated ones lack to explain the median residual.
+fn excess_sigma_px(stated: &[JointFrame], fit: &JointFit) -> f64 {
+    const BISECTIONS: usize = 40;
+    let stars = stated.iter().flat_map(|frame| &frame.stars);
+    let stars: Vec<_> = stars.zip(fit.residuals_px.iter().flatten()).collect();
+    let median_sq = |excess_px: f64| {
+        let squares = stars.iter().map(|(star, [x, y])| {
+            (x * x + y * y) / (star.sigma_px.powi(2) + excess_px * excess_px)
+        });
+        median(&mut squares.collect::<Vec<_>>())
+    };
+    let expected = 2.0 * LN_2;
+    let mut range_px = [0.0, 100.0];
+    if median_sq(0.0) <= expected {
+        return 0.0;
+    }
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (range_px[0] + range_px[1]);
+        range_px[usize::from(median_sq(middle) <= expected)] = middle;
+    }
+    range_px[1]
+}

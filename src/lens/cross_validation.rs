@@ -1,0 +1,104 @@
+//! Which lens predicts best the stars that a fit leaves out?
+
+use crate::base::statistics::median;
+use crate::camera::{CameraModel, DistortionModel, Projection};
+use crate::identify::fit::{
+    JointFrame, WIDE_RAD, fit_jointly, is_affordable, least_gain, residuals_px, robust_sigma_px,
+    worth_a_projection,
+};
+
+/// Parts of the stars, of which each is left out once.
+const FOLDS: usize = 5;
+
+/// A lens, and how it predicts stars that were left out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tested {
+    pub projection: Projection,
+    pub model: Option<DistortionModel>,
+    /// Sum of the squared errors in standard errors, of which outliers have less.
+    chi_sq: f64,
+    /// Standard deviation of the errors on each axis, in pixels, from their median.
+    pub rms_px: f64,
+}
+
+/// The lens that predicts left-out stars best for its number of terms. Only a wide field tells
+/// projections apart. `None` where no lens can be fitted.
+pub(super) fn best_lens(frames: &[JointFrame], start: &CameraModel) -> Option<Tested> {
+    let stars: usize = frames.iter().map(|frame| frame.stars.len()).sum();
+    let equations = 2.0 * stars as f64;
+    let projections = if start.radius_rad() > WIDE_RAD {
+        Projection::ALL.to_vec()
+    } else {
+        vec![Projection::Pinhole]
+    };
+    let of_projection = |projection: Projection| {
+        let penalty = worth_a_projection(projection);
+        let tested = best_model(frames, &start.reprojected(projection), stars)?;
+        Some((equations * tested.chi_sq.ln() + penalty, tested))
+    };
+    let tested = projections.into_iter().filter_map(of_projection);
+    let best = tested.min_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.map(|(_, tested)| tested)
+}
+
+/// The simplest distortion that no richer one clearly surpasses.
+fn best_model(frames: &[JointFrame], start: &CameraModel, stars: usize) -> Option<Tested> {
+    let equations = 2.0 * stars as f64;
+    let mut best: Option<Tested> = None;
+    let models = DistortionModel::ALL.map(Some);
+    for model in std::iter::once(None).chain(models) {
+        if model.is_some_and(|model| !is_affordable(model, stars)) {
+            break;
+        }
+        let Some(tested) = test(frames, start, model) else {
+            continue;
+        };
+        let is_better = |best: &Tested| {
+            let wanted = model.map_or(0.0, |model| least_gain(model, best.model));
+            equations * (best.chi_sq / tested.chi_sq).ln() > wanted
+        };
+        if best.as_ref().is_none_or(is_better) {
+            best = Some(tested);
+        }
+    }
+    best
+}
+
+/// How a lens predicts the stars that are left out.
+fn test(
+    frames: &[JointFrame],
+    start: &CameraModel,
+    model: Option<DistortionModel>,
+) -> Option<Tested> {
+    let whole = fit_jointly(frames, start, model)?;
+    let (mut chi_sq, mut squares) = (0.0, Vec::new());
+    for fold in 0..FOLDS {
+        let part = |is_in: bool| {
+            let frame = |(frame, attitude): (&JointFrame, _)| {
+                let stars = frame.stars.iter().enumerate();
+                let stars = stars.filter(|(number, _)| (number % FOLDS == fold) == is_in);
+                JointFrame {
+                    stars: stars.map(|(_, star)| *star).collect(),
+                    icrs_to_camera: attitude,
+                }
+            };
+            let attitudes = whole.attitudes.iter().copied();
+            frames.iter().zip(attitudes).map(frame).collect::<Vec<_>>()
+        };
+        let fit = fit_jointly(&part(false), &whole.camera, model)?;
+        for (left_out, attitude) in part(true).iter().zip(&fit.attitudes) {
+            let residuals = residuals_px(&left_out.stars, &fit.camera, attitude)?;
+            for (star, [x, y]) in left_out.stars.iter().zip(residuals) {
+                let sigma_px = robust_sigma_px(star.sigma_px, x.hypot(y));
+                chi_sq += (x * x + y * y) / (sigma_px * sigma_px);
+                squares.push(x * x + y * y);
+            }
+        }
+    }
+    Some(Tested {
+        projection: start.projection(),
+        model,
+        chi_sq,
+        rms_px: (median(&mut squares) / (2.0 * std::f64::consts::LN_2)).sqrt(),
+    })
+}
