@@ -4,7 +4,7 @@ use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
-use crate::camera::{self, KnownLens};
+use crate::camera::{self, Distortion, KnownLens};
 use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
 use nalgebra::Vector3;
@@ -139,9 +139,13 @@ impl ScalePrior {
     pub fn of_lens(lens: &KnownLens) -> Self {
         /// Temperature, focus and refraction change it by less.
         const TOLERANCE: f64 = 0.01;
+        /// The scale in a corner differs by so many times the relative displacement there.
+        const IN_CORNERS: f64 = 3.0;
+        let camera = lens.camera();
+        let displaced_px = camera.distortion().map_or(0.0, Distortion::largest_px);
         Self {
-            scale: Scale::Pixel(1.0 / lens.camera().central_focal_length_px()),
-            tolerance: TOLERANCE,
+            scale: Scale::Pixel(1.0 / camera.central_focal_length_px()),
+            tolerance: (TOLERANCE + IN_CORNERS * displaced_px / camera.radius_px()).min(0.5),
             source: ScaleSource::Camera,
         }
     }

@@ -92,14 +92,15 @@ fn residuals(measured: &LensCalibration) -> Panel {
         vec![(x, -y), (x + scale * dx, -(y + scale * dy))]
     };
     let [x, y] = axes(coverage);
-    let tails = known().map(|cell| (cell.centre_px[0], -cell.centre_px[1]));
+    // Where an arrow begins.
+    let tails = known().map(|cell| (cell.centre_px[0], -cell.centre_px[1], "·".to_owned()));
     Panel {
         title: format!("Mean residuals, the longest {longest_px:.3} px"),
         x,
         y,
         layers: vec![
             Layer::unnamed(BLUE, Marks::Lines(known().map(arrow).collect())),
-            Layer::unnamed(BLACK, Marks::Points(tails.collect())),
+            Layer::unnamed(BLACK, Marks::Texts(tails.collect())),
         ],
     }
 }

@@ -25,8 +25,6 @@ pub struct CameraFit {
     pub stars: usize,
 }
 
-/// Parameters that are free where the lens is known.
-const ATTITUDE_PARAMETERS: usize = 3;
 /// The fit has converged where a step moves the predicted places by less than this, in standard errors.
 const CONVERGED: f64 = 1e-3;
 
@@ -125,7 +123,8 @@ pub fn fit_known_lens(
         Some(Irregular5) => fit!(Irregular5.terms()),
     }?;
     Some(CameraFit {
-        parameters: ATTITUDE_PARAMETERS,
+        // No star is used up by the lens.
+        parameters: POSE_PARAMETERS,
         ..fit
     })
 }
@@ -207,7 +206,7 @@ mod tests {
     use crate::base::coords::{PixelPoint, UnitVector};
     use crate::base::units::RAD_PER_DEG;
     use crate::camera::Projection;
-    use nalgebra::Vector3;
+    use nalgebra::{DMatrix, DVector, Vector3};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -322,6 +321,47 @@ mod tests {
             assert!((nees - 1.0).abs() < 0.2, "{model:?} {nees}");
             assert!((focal_sq - 1.0).abs() < 0.3, "{model:?} {focal_sq}");
         }
+    }
+
+    #[test]
+    fn four_stars_are_enough_for_a_known_lens_and_its_error_is_in_the_attitudes() {
+        const TRIALS: u32 = 300;
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let truth = Rotation::looking_at(&UnitVector::from_ra_dec(0.3, 0.5), 2.0);
+        let camera = lens(DistortionModel::BrownConrady, true);
+        let terms = camera.distortion().unwrap();
+        // Errors of ln f and of the terms.
+        let sigma = [3e-4, 0.3, 0.2, 0.1, 0.6, 0.5, 0.05, 0.05];
+        let covariance = DMatrix::from_diagonal(&DVector::from_iterator(8, sigma.map(|s| s * s)));
+        let exact = stars_of(&camera, &truth);
+        let mut nees = 0.0;
+        for _ in 0..TRIALS {
+            let mut deviate = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
+            let off = sigma.map(&mut deviate);
+            let stated = terms.changed(off[1..].iter().copied());
+            let stated = camera
+                .with_focal_length(camera.focal_length_px() * off[0].exp())
+                .with_distortion(Some(stated));
+            let known = KnownLens::new(stated, covariance.clone()).unwrap();
+            let mut stars: Vec<MeasuredStar> = exact.iter().step_by(11).copied().collect();
+            for star in &mut stars {
+                star.pixel.x += deviate(star.sigma_px);
+                star.pixel.y += deviate(star.sigma_px);
+            }
+            let turned = truth.then_turn(Vector3::new(0.002, -0.003, 0.001));
+            let fit = fit_known_lens(&stars, &known, &turned, &mut Vec::new()).unwrap();
+            let turn = fit.icrs_to_camera.matrix() * truth.matrix().transpose();
+            let half = (turn - turn.transpose()) * 0.5;
+            let error = Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)]);
+            let inverse = fit
+                .covariance
+                .fixed_view::<3, 3>(0, 0)
+                .try_inverse()
+                .unwrap();
+            nees += (error.transpose() * inverse * error)[0] / f64::from(TRIALS);
+        }
+        // A standard error of 0.14.
+        assert!((nees - 3.0).abs() < 0.5, "{nees}");
     }
 
     #[test]
