@@ -11,6 +11,7 @@ mod detect;
 mod errors;
 mod image;
 mod interrupt;
+mod lens;
 mod options;
 mod pages;
 mod pipeline;
@@ -33,6 +34,8 @@ mod _starpipe {
     use super::detect::detect;
     #[pymodule_export]
     use super::image::check_size;
+    #[pymodule_export]
+    use super::lens::calibrate;
     #[pymodule_export]
     use super::pages::{Page, Pages, read_page};
     #[pymodule_export]

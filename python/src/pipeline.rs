@@ -211,7 +211,10 @@ impl Pipeline {
         };
         let dark = dark.map(&mut master).transpose()?;
         let flat = flat.map(&mut master).transpose()?;
-        let sheet = self.camera.as_ref().and_then(|camera| camera.sheet.as_ref());
+        let sheet = self
+            .camera
+            .as_ref()
+            .and_then(|camera| camera.sheet.as_ref());
         let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
         Calibration::new(dark, flat, None, bias_adu).map_err(exception)
     }

@@ -10,6 +10,7 @@ from importlib.metadata import version as _version
 
 from ._darks import Darks, darks
 from ._detect import Detections, detect
+from ._lens import LensCalibration, calibrate
 from ._options import SolveOptions
 from ._pipeline import Pipeline
 from ._result import Result
@@ -19,11 +20,13 @@ from ._studies import Validation, defocus, limit, robustness, validate
 __all__ = [
     "Darks",
     "Detections",
+    "LensCalibration",
     "Pipeline",
     "Result",
     "Simulation",
     "SolveOptions",
     "Validation",
+    "calibrate",
     "darks",
     "defocus",
     "detect",

@@ -1,4 +1,4 @@
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any, TypeAlias, final
 
@@ -18,6 +18,7 @@ __all__ = [
     "archive_differences",
     "archive_nights",
     "archive_plan",
+    "calibrate",
     "check_size",
     "defocus",
     "detect",
@@ -159,6 +160,7 @@ def detect(
     max_stars: int | None,
     threads: int,
 ) -> str: ...
+def calibrate(solved: Sequence[Solved]) -> tuple[str, str]: ...
 def limit(stated: dict[str, Any]) -> str: ...
 def simulate(
     stated: dict[str, Any],

@@ -10,6 +10,8 @@ use crate::camera::{CameraModel, KnownLens};
 use crate::identify::fit::{JointFit, JointFrame, fit_jointly, robust_sigma_px};
 use std::f64::consts::LN_2;
 
+/// Start of the comment before the table of a lens.
+pub const MEASURED_BY: &str = "Measured by starpipe";
 /// Rounds of fitting with the errors that the last residuals show.
 const ROUNDS: usize = 5;
 /// The relative difference of focal lengths at which a frame is of another lens.
@@ -60,6 +62,26 @@ pub struct LensCalibration {
     pub drift: Option<ScaleDrift>,
     /// How the camera stands, if it did not move, and site and time are known.
     pub mount: Option<Mount>,
+}
+
+impl LensCalibration {
+    /// The lens as a table of `camera.toml`.
+    pub fn to_toml(&self) -> String {
+        let about = [
+            format!(
+                "{MEASURED_BY} {} in {} stars of {} frames; residuals {:.3} px on each axis,",
+                env!("CARGO_PKG_VERSION"),
+                self.stars,
+                self.frames.len(),
+                self.rms_px
+            ),
+            format!(
+                "{:.3} px of stars that were left out of the fit.",
+                self.held_out_rms_px
+            ),
+        ];
+        self.lens.to_toml(&about)
+    }
 }
 
 /// A frame that a lens was measured in.
@@ -265,7 +287,7 @@ fn limited(camera: &CameraModel, frames: &[LensFrame]) -> CameraModel {
     /// As many stars at least are as far from the axis.
     const OUTERMOST: usize = 5;
     /// A lens that is known so far of the way to the corners is known up to them.
-    const NEARLY: f64 = 0.95;
+    const NEARLY: f64 = 0.9;
     let axis = camera.direction_of(&camera.axis());
     let angles = frames
         .iter()

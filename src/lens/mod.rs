@@ -19,6 +19,8 @@ mod frames;
 mod mount;
 mod scale_drift;
 
+#[doc(hidden)]
+pub use calibrate::MEASURED_BY;
 pub use calibrate::{CalibrateError, LensCalibration, UsedFrame, calibrate};
 pub use coverage::{Coverage, CoverageCell};
 pub use frames::{LeftOutFrame, LensFrame, Unfit};

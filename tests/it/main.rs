@@ -7,6 +7,7 @@ mod accuracy;
 mod apparent;
 mod archive;
 mod brightest_stars;
+mod calibrate;
 mod catalog;
 mod catalog_kinds;
 mod cli;

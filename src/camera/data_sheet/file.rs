@@ -1,121 +1,20 @@
 //! Reads `camera.toml` strictly, with errors that name line and key.
 
+use super::error::{DataSheetError, line_of};
 use super::imperfections::{Imperfections, SpotForm};
 use super::key::{Key, Limits, nearest_name};
 use super::keys::{IMPERFECTION_KEYS, KEYS, is_curve};
-use super::response::{Response, ResponseError};
+use super::lens_table;
+use super::response::Response;
 use super::sheet::DataSheet;
-use super::spot_image::{SpotImage, SpotImageError};
+use super::spot_image::SpotImage;
 use crate::base::files;
 use crate::camera::{KnownLens, Projection};
 use std::collections::BTreeMap;
 use std::io::Read as _;
-use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use toml::Spanned;
-
-/// Error of reading a data sheet.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DataSheetError {
-    /// The file cannot be read.
-    #[error("{}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is larger than any data sheet.
-    #[error("{}: larger than {limit} bytes: too large for a description of a camera", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Maximum size, in bytes.
-        limit: u64,
-    },
-    /// The file is not valid TOML.
-    #[error("{}, line {line}: {message}", path.display())]
-    Syntax {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// Error of the parser.
-        message: String,
-    },
-    /// An unknown key.
-    #[error("{}, line {line}: unknown key '{key}'{}", path.display(), suggestion(.nearest.as_deref()))]
-    UnknownKey {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The key.
-        key: String,
-        /// The most similar key.
-        nearest: Option<String>,
-    },
-    /// An invalid value.
-    #[error("{}, line {line}: {key} is {found}, expected {expected}", path.display())]
-    Value {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The key.
-        key: String,
-        /// The value.
-        found: String,
-        /// What is valid.
-        expected: String,
-    },
-    /// A required key is missing.
-    #[error("{}: {key} is missing: {about}", path.display())]
-    Missing {
-        /// The file.
-        path: PathBuf,
-        /// The key.
-        key: &'static str,
-        /// Description of the key.
-        about: &'static str,
-    },
-    /// An invalid curve of a transmission or an efficiency.
-    #[error("{}, line {line}: {key}", path.display())]
-    Response {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The key.
-        key: String,
-        /// The error in the curve.
-        source: Box<ResponseError>,
-    },
-    /// An invalid picture of a spot.
-    #[error("{}, line {line}: spot_file", path.display())]
-    Spot {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        /// The error in the picture.
-        source: Box<SpotImageError>,
-    },
-    /// Values that contradict each other.
-    #[error("{}: {what}", path.display())]
-    Contradiction {
-        /// The file.
-        path: PathBuf,
-        /// Description of the contradiction.
-        what: String,
-    },
-}
-
-fn suggestion(nearest: Option<&str>) -> String {
-    nearest.map_or_else(String::new, |name| format!("; did you mean '{name}'?"))
-}
 
 /// Maximum size of a data sheet, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -173,7 +72,7 @@ impl CameraDescription {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataSheetError> {
         let path = path.as_ref();
         let text = text_of(path)?;
-        let lens = KnownLens::parse(path, &text)?.map(Arc::new);
+        let lens = lens_table::parse(path, &text)?.map(Arc::new);
         let file = SheetFile::parse(path, &text)?;
         let is_lens_alone = lens.is_some() && file.table.is_empty();
         let sheet = (!is_lens_alone).then(|| file.data_sheet()).transpose()?;
@@ -186,16 +85,6 @@ impl From<DataSheet> for CameraDescription {
         Self {
             sheet: Some(sheet),
             lens: None,
-        }
-    }
-}
-
-impl DataSheetError {
-    pub(in crate::camera) fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> Self {
-        Self::Syntax {
-            path: path.to_owned(),
-            line: line_of(text, error.span()),
-            message: error.message().trim().to_owned(),
         }
     }
 }
@@ -497,16 +386,6 @@ fn csv_of(points: &[toml::Value]) -> Option<String> {
         text += &format!("{},{}\n", as_number(nm)?, as_number(value)?);
     }
     Some(text)
-}
-
-/// The line, counted from 1, in which `span` begins.
-fn line_of(text: &str, span: Option<Range<usize>>) -> usize {
-    let end = span.map_or(0, |span| span.start).min(text.len());
-    text.as_bytes()[..end]
-        .iter()
-        .filter(|b| **b == b'\n')
-        .count()
-        + 1
 }
 
 #[cfg(test)]

@@ -12,17 +12,20 @@
 //!
 //! Caveats: one spot for the whole field; no stray light.
 
+mod error;
 mod file;
 mod imperfections;
 mod key;
 mod keys;
+mod lens_table;
 mod preset;
 mod response;
 mod sheet;
 mod spot_image;
 mod template;
 
-pub use file::{CameraDescription, DataSheetError};
+pub use error::DataSheetError;
+pub use file::CameraDescription;
 #[doc(hidden)]
 pub use imperfections::lens_transmission;
 pub use imperfections::{Imperfections, SpotForm};

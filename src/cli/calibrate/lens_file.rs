@@ -1,17 +1,13 @@
 //! The file that a lens is written to.
 
-use super::CalibrateArgs;
 use crate::cli::exit::CommandError;
 use anyhow::Context as _;
-use starpipe::lens::LensCalibration;
+use starpipe::lens::{LensCalibration, MEASURED_BY};
 use std::path::Path;
 
-/// Start of the comment before the table.
-const MEASURED_BY: &str = "# Measured by starpipe";
-
 /// Refuses to overwrite a file without --force.
-pub(super) fn check(arguments: &CalibrateArgs) -> Result<(), CommandError> {
-    let out = arguments.out.as_ref().filter(|_| !arguments.force);
+pub(super) fn check(out: Option<&Path>, force: bool) -> Result<(), CommandError> {
+    let out = out.filter(|_| !force);
     // A link counts as existing even if its target does not exist.
     match out.filter(|out| out.symlink_metadata().is_ok()) {
         None => Ok(()),
@@ -30,27 +26,14 @@ pub(super) fn text(camera: Option<&Path>, measured: &LensCalibration) -> anyhow:
     if !text.is_empty() {
         text += "\n";
     }
-    let about = [
-        format!(
-            "{} {} in {} stars of {} frames; residuals {:.3} px on each axis,",
-            MEASURED_BY.trim_start_matches("# "),
-            env!("CARGO_PKG_VERSION"),
-            measured.stars,
-            measured.frames.len(),
-            measured.rms_px
-        ),
-        format!(
-            "{:.3} px of stars that were left out of the fit.",
-            measured.held_out_rms_px
-        ),
-    ];
-    Ok(text + &measured.lens.to_toml(&about))
+    Ok(text + &measured.to_toml())
 }
 
 /// A description up to its table of a lens.
 fn without_lens(text: &str) -> String {
     let lines = text.lines();
-    let before = lines.take_while(|line| line.trim() != "[lens]" && !line.starts_with(MEASURED_BY));
+    let is_comment = |line: &str| line.trim_start_matches("# ").starts_with(MEASURED_BY);
+    let before = lines.take_while(|line| line.trim() != "[lens]" && !is_comment(line));
     let before: Vec<&str> = before.collect();
     let text = before.join("\n");
     match text.trim_end() {

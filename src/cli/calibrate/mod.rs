@@ -57,7 +57,7 @@ pub(crate) struct CalibrateArgs {
 
 /// `starpipe calibrate`
 pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandError> {
-    lens_file::check(&arguments)?;
+    lens_file::check(arguments.out.as_deref(), arguments.force)?;
     let plan = arguments.plan()?;
     let (paths, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
     let (frames, left_out, unread) = solve(&arguments, &plan, &paths)?;

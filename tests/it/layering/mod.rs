@@ -37,6 +37,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "photometry",
         ],
     ),
+    ("lens", &["base", "sky", "camera", "identify", "pipeline"]),
     (
         "track",
         &[
@@ -62,6 +63,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "identify",
             "photometry",
             "pipeline",
+            "lens",
             "track",
         ],
     ),

@@ -1,0 +1,65 @@
+"""The lens of a camera, from several of its frames."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from . import _starpipe
+from ._result import Result
+
+
+class LensCalibration:
+    """A lens that was measured in several frames.
+
+    Attributes
+    ----------
+    report : dict
+        As the JSON of ``starpipe calibrate``: ``lens``, ``frames``, ``left_out``, ``rms_px``,
+        ``held_out_rms_px``, ``drift``, ``mount``, ...
+    toml : str
+        The lens as a description of a camera: ``Pipeline(camera=path)`` with a file of it holds the
+        lens.
+    """
+
+    def __init__(self, report: dict[str, Any], toml: str) -> None:
+        self.report = report
+        self.toml = toml
+
+    def __repr__(self) -> str:
+        lens = self.report["lens"]
+        return (
+            f"<LensCalibration: {lens['model']}, focal length {lens['focal_length_px']} px, "
+            f"{self.report['stars']} stars in {len(self.report['frames'])} frames>"
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the lens into a new file."""
+        with Path(path).open("x", encoding="utf-8") as file:
+            file.write(self.toml)
+
+
+def calibrate(results: Iterable[Result]) -> LensCalibration:
+    """Measure the lens of a camera in frames that a pipeline has solved.
+
+    Frames that are not identified, or do not fit the others, are left out, see
+    ``LensCalibration.report["left_out"]``.
+
+    Parameters
+    ----------
+    results : iterable of Result
+        As `Pipeline.solve` and `Pipeline.solve_many` return them; not restored by pickle.
+
+    Raises
+    ------
+    ValueError
+        If no frame is identified, or the stars do not determine a lens.
+    """
+    solved = [result.__dict__.get("_solved") for result in results]
+    if None in solved:
+        raise ValueError("a result that was restored by pickle has no stars to calibrate with")
+    report, toml = _starpipe.calibrate(solved)
+    return LensCalibration(json.loads(report), toml)
