@@ -15,6 +15,7 @@
 mod calibrate;
 mod coverage;
 mod cross_validation;
+pub mod formats;
 mod frames;
 mod mount;
 mod scale_drift;

@@ -1,0 +1,22 @@
+//! A lens in the files of other programs: OpenCV.
+//!
+//! | format | written | read |
+//! |---|---|---|
+//! | OpenCV `FileStorage` (cv, cv::fisheye) | [`opencv_yaml`] | [`from_opencv_yaml`] |
+//!
+//! What a format can say exactly is converted exactly. Everything else is fitted over what the frame
+//! sees, and the largest error is told. Fits of formats that are meant to be exact are refused if they are
+//! off by more than [`TOLERANCE_PX`]; functions ending in `_within` take another limit.
+//!
+//! In all of these programs, as here, the centre of the top-left pixel is (0, 0).
+
+mod error;
+mod fit;
+mod opencv;
+mod yaml;
+
+pub use error::FormatError;
+pub use opencv::{from_opencv_yaml, from_opencv_yaml_within, opencv_yaml, opencv_yaml_within};
+
+/// The largest error of a converted lens, in pixels, unless the caller allows more.
+pub const TOLERANCE_PX: f64 = 0.01;
