@@ -1,9 +1,10 @@
-//! A lens in the files of other programs: OpenCV and ROS.
+//! A lens in the files of other programs: OpenCV, ROS and RMS.
 //!
 //! | format | written | read |
 //! |---|---|---|
 //! | OpenCV `FileStorage` (cv, cv::fisheye) | [`opencv_yaml`] | [`from_opencv_yaml`] |
 //! | ROS `camera_info` | [`ros_camera_info`] | [`from_opencv_yaml`] |
+//! | RMS platepar | [`platepar`] | [`from_platepar`] |
 //!
 //! What a format can say exactly is converted exactly. Everything else is fitted over what the frame
 //! sees, and the largest error is told. Fits of formats that are meant to be exact are refused if they are
@@ -14,11 +15,13 @@
 mod error;
 mod fit;
 mod opencv;
+mod platepar;
 mod ros;
 mod yaml;
 
 pub use error::FormatError;
 pub use opencv::{from_opencv_yaml, from_opencv_yaml_within, opencv_yaml, opencv_yaml_within};
+pub use platepar::{Pointing, from_platepar, from_platepar_within, platepar};
 pub use ros::ros_camera_info;
 
 /// The largest error of a converted lens, in pixels, unless the caller allows more.
