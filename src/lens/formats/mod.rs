@@ -1,10 +1,11 @@
-//! A lens in the files of other programs: OpenCV, ROS and RMS.
+//! A lens in the files of other programs: OpenCV, ROS, RMS and indi-allsky.
 //!
 //! | format | written | read |
 //! |---|---|---|
 //! | OpenCV `FileStorage` (cv, cv::fisheye) | [`opencv_yaml`] | [`from_opencv_yaml`] |
 //! | ROS `camera_info` | [`ros_camera_info`] | [`from_opencv_yaml`] |
 //! | RMS platepar | [`platepar`] | [`from_platepar`] |
+//! | indi-allsky's lens and `VIRTUALSKY` settings | [`indi_allsky_json`] | |
 //!
 //! What a format can say exactly is converted exactly. Everything else is fitted over what the frame
 //! sees, and the largest error is told. Fits of formats that are meant to be exact are refused if they are
@@ -14,12 +15,14 @@
 
 mod error;
 mod fit;
+mod indi_allsky;
 mod opencv;
 mod platepar;
 mod ros;
 mod yaml;
 
 pub use error::FormatError;
+pub use indi_allsky::{IndiAllskyLens, indi_allsky, indi_allsky_json};
 pub use opencv::{from_opencv_yaml, from_opencv_yaml_within, opencv_yaml, opencv_yaml_within};
 pub use platepar::{Pointing, from_platepar, from_platepar_within, platepar};
 pub use ros::ros_camera_info;

@@ -8,6 +8,7 @@ mod sky;
 mod write;
 
 pub use read::{from_platepar, from_platepar_within};
+pub(super) use sky::Sky;
 pub use write::platepar;
 
 use crate::base::coords::{Camera, Icrs, Rotation};
