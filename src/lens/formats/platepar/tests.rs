@@ -55,7 +55,7 @@ fn pixel_of(
         .unwrap()
 }
 
-// The expected pixels are those of a program of its own for RMS's formulas, in Python.
+// The expected pixels are those of RMS's formulas in scripts/check-platepar.py.
 
 #[test]
 fn a_radial_plate_is_that_of_rms() {
