@@ -135,11 +135,14 @@ fn cameras() -> Vec<CameraModel> {
         (Projection::Equidistant, 800.0),
         (Projection::Equisolid, 700.0),
         (Projection::Stereographic, 700.0),
+        // The whole sky, and a wide pinhole.
+        (Projection::Equidistant, 220.0),
+        (Projection::Pinhole, 900.0),
     ]
     .into_iter()
     .flat_map(|(projection, focal_px)| {
         let camera = CameraModel::pinhole(1280.0, 720.0, focal_px, false);
-        let camera = camera.with_projection(projection);
+        let camera = camera.with_projection(projection).limited_to(1.5);
         let radius_px = camera.radius_px();
         let mut centred_px = lens_px;
         centred_px[5..7].fill(0.0);
@@ -161,10 +164,8 @@ fn what_is_written_is_read_again() {
         let pointing = pointing();
         let text = platepar(&camera, &pointing).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert!(
-            json["largest_error_px"].as_f64().unwrap() < TOLERANCE_PX,
-            "{text}"
-        );
+        let told_px = json["largest_error_px"].as_f64().unwrap();
+        assert!(told_px < TOLERANCE_PX, "{text}");
         let (read, read_pointing) = from_platepar(&text).unwrap();
         assert_eq!(read_pointing.date.to_iso(), pointing.date.to_iso());
         let mut largest_px = 0f64;
@@ -176,7 +177,7 @@ fn what_is_written_is_read_again() {
             let again = read.pixel_of(&again).unwrap();
             largest_px = largest_px.max(again.distance_to(&pixel));
         }
-        assert!(largest_px < 0.015, "{largest_px} {camera:?} {text}");
+        assert!(largest_px < TOLERANCE_PX, "{largest_px} {camera:?} {text}");
     }
 }
 
