@@ -14,14 +14,6 @@ fn preset(camera: &Path) -> Option<Preset> {
     camera.to_str().and_then(Preset::named)
 }
 
-/// The data sheet of a preset, or that in a file.
-pub fn data_sheet(camera: &Path) -> PyResult<DataSheet> {
-    match preset(camera) {
-        Some(preset) => Ok(preset.data_sheet()),
-        None => DataSheet::read(camera).map_err(exception),
-    }
-}
-
 /// The description of a preset, or that in a file.
 pub fn description(camera: &Path) -> PyResult<CameraDescription> {
     match preset(camera) {

@@ -33,6 +33,7 @@ pub struct Options {
     centroid: Option<String>,
     name_odds: f64,
     effort: String,
+    refine_lens: bool,
     attitude_only: bool,
     time_limit_s: Option<f64>,
 }
@@ -62,6 +63,7 @@ impl Options {
         options.sigma = self.sigma;
         options.name_odds = self.name_odds;
         options.effort = effort(&self.effort)?;
+        options.refine_lens = self.refine_lens;
         options.attitude_only = self.attitude_only;
         options.time_limit_s = self.time_limit_s;
         if let Some(false_alarms) = self.false_alarms_per_mpx {

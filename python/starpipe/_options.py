@@ -70,6 +70,8 @@ class SolveOptions(TypedDict, total=False):
         default.
     effort : {"fast", "normal", "thorough"}
         How much is tried where the brightest stars do not identify a frame at once.
+    refine_lens : bool
+        Fit the lens to each frame, although the camera's description has one that was measured.
     attitude_only : bool
         Stop at the attitude: no star beyond the brightest is named.
     time_limit : Quantity or float
@@ -95,6 +97,7 @@ class SolveOptions(TypedDict, total=False):
     centroid: Literal["gaussian-fit", "grey-weighted"] | None
     name_odds: float
     effort: Literal["fast", "normal", "thorough"]
+    refine_lens: bool
     attitude_only: bool
     time_limit: Quantity | float | None
 
@@ -121,6 +124,7 @@ def solve_options(
     centroid: Any = None,
     name_odds: Any = NAME_ODDS,
     effort: Any = "normal",
+    refine_lens: bool = False,
     attitude_only: bool = False,
     time_limit: Any = None,
 ) -> dict[str, Any]:
@@ -150,6 +154,7 @@ def solve_options(
         "centroid": centroid,
         "name_odds": within(name_odds, "", "name_odds", 1.0),
         "effort": str(effort),
+        "refine_lens": bool(refine_lens),
         "attitude_only": bool(attitude_only),
         "time_limit_s": positive(time_limit, "s", "time_limit"),
     }

@@ -4,7 +4,7 @@ use super::distortion::DistortionModel;
 use super::model::CameraModel;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::base::units::DEG_PER_RAD;
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 use std::fmt::Write as _;
 
 /// A lens that was measured, as by [`crate::lens::calibrate`].
@@ -34,6 +34,18 @@ impl KnownLens {
             covariance,
             information,
         })
+    }
+
+    /// A camera whose errors are not known: they are taken to be those of good lenses, 0.1 % of the focal
+    /// length, and for each term 0.1 % of the distance of the corners.
+    pub fn with_assumed_errors(camera: CameraModel) -> Option<Self> {
+        const RELATIVE: f64 = 1e-3;
+        let terms = camera.distortion_model().map_or(0, DistortionModel::terms);
+        let sigma_px = RELATIVE * camera.radius_px();
+        let variances = std::iter::once(RELATIVE).chain(std::iter::repeat_n(sigma_px, terms));
+        let variances = variances.map(|sigma| sigma * sigma);
+        let diagonal = DVector::from_iterator(1 + terms, variances);
+        Self::new(camera, DMatrix::from_diagonal(&diagonal))
     }
 
     /// The camera.

@@ -2,6 +2,7 @@
 
 use super::coverage::Coverage;
 use super::cross_validation::best_lens;
+use super::formats::Pointing;
 use super::frames::{LeftOutFrame, LensFrame, Unfit};
 use super::mount::Mount;
 use super::scale_drift::{FrameScale, ScaleDrift};
@@ -96,6 +97,8 @@ pub struct UsedFrame {
     pub rms_px: f64,
     /// Its scale relative to that of the lens, less 1.
     pub scale: FrameScale,
+    /// Its attitude, if site, date and time are known.
+    pub pointing: Option<Pointing>,
 }
 
 /// Measures the lens of the camera of `frames`; `left_out` are frames that were not identified.
@@ -261,6 +264,7 @@ impl Fitted {
                 stars: frame.stars(),
                 rms_px: rms_px(residuals.iter()),
                 scale: FrameScale::of(frame, &fit.camera, excess_sigma_px),
+                pointing: frame.pointing(),
             });
         let used: Vec<UsedFrame> = used.collect();
         let dated = frames.iter().zip(&used).filter_map(|(frame, used)| {

@@ -1,5 +1,6 @@
 //! The frames of a calibration.
 
+use super::formats::Pointing;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::camera::CameraModel;
@@ -125,6 +126,15 @@ impl LensFrame {
     pub(super) fn with_attitude(mut self, icrs_to_camera: Rotation<Icrs, Camera>) -> Self {
         self.joint.icrs_to_camera = icrs_to_camera;
         self
+    }
+
+    /// Its attitude relative to the directions of the catalogue, if site, date and time are known.
+    pub(super) fn pointing(&self) -> Option<Pointing> {
+        Some(Pointing {
+            icrs_to_camera: self.places.astrometric_attitude(&self.joint.icrs_to_camera),
+            site: self.observation?.site,
+            date: self.date?,
+        })
     }
 
     /// Columns and rows, and whether it is mirrored.

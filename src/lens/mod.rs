@@ -1,6 +1,6 @@
 //! Which lens does a camera have? It is measured in several of its frames at once.
 //!
-//! solved frames → [`LensFrame`] for each → [`calibrate`] → [`LensCalibration`] with the
+//! solved frames → [`LensFrame`] for each → [`calibrate()`] → [`LensCalibration`] with the
 //! [`KnownLens`](crate::camera::KnownLens) that `camera.toml` holds
 //!
 //! 1. Frames of another size or focal length are left out.

@@ -202,6 +202,37 @@ fn a_camera_on_the_ground_is_found_to_stand_still() {
 }
 
 #[test]
+fn lenses_of_other_programs_are_written_and_held() {
+    let directory = tempfile::tempdir().unwrap();
+    let night = directory.path().join("night");
+    frames(&night, &[&LENS[..], &["--seed=3", "--count=4"]].concat());
+    let path = |name: &str| directory.path().join(name);
+    let option = |name: &str, file: &str| format!("--{name}={}", path(file).display());
+    let more = [
+        option("opencv", "cv.yaml"),
+        option("ros", "ros.yaml"),
+        option("platepar", "rms.cal"),
+        "--site=46.5,7.9,500".to_owned(),
+    ];
+    let more: Vec<&str> = more.iter().map(String::as_str).collect();
+    calibrated(&[&night], &more);
+    let frame = night.join("frame-00000.tif");
+    for name in ["cv.yaml", "ros.yaml", "rms.cal"] {
+        let camera = format!("--camera={}", path(name).display());
+        let ran = Ran::new(
+            starpipe()
+                .args(["process", "--format=json", DATE, &camera])
+                .arg(&frame),
+        );
+        assert_eq!(ran.status, 0, "{name}: {}", ran.stderr);
+        let found = ran.reports().remove(0);
+        assert_eq!(found["optics"]["held"], true, "{name}: {}", found["notes"]);
+    }
+    let ran = Ran::new(starpipe().args(["calibrate", more[0]]).arg(&night));
+    assert_eq!(ran.status, 2, "the file exists");
+}
+
+#[test]
 fn what_is_no_night_is_refused_and_files_are_kept() {
     let directory = tempfile::tempdir().unwrap();
     let kept = directory.path().join("kept.toml");

@@ -5,15 +5,15 @@ use anyhow::Context as _;
 use starpipe::lens::{LensCalibration, MEASURED_BY};
 use std::path::Path;
 
-/// Refuses to overwrite a file without --force.
-pub(super) fn check(out: Option<&Path>, force: bool) -> Result<(), CommandError> {
-    let out = out.filter(|_| !force);
+/// Refuses to overwrite one of these files.
+pub(super) fn check<'a>(files: impl IntoIterator<Item = &'a Path>) -> Result<(), CommandError> {
     // A link counts as existing even if its target does not exist.
-    match out.filter(|out| out.symlink_metadata().is_ok()) {
+    let exists = |path: &&Path| path.symlink_metadata().is_ok();
+    match files.into_iter().find(exists) {
         None => Ok(()),
-        Some(out) => Err(CommandError::Usage(format!(
+        Some(path) => Err(CommandError::Usage(format!(
             "{} exists; --force overwrites it",
-            out.display()
+            path.display()
         ))),
     }
 }

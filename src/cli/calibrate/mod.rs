@@ -1,5 +1,6 @@
 //! `calibrate`: measures the lens of a camera in several of its frames.
 
+mod exports;
 mod figure;
 mod lens_file;
 
@@ -17,6 +18,7 @@ use super::process::CalibrationOptions;
 use super::progress::frames_bar;
 use super::solving::{Inputs, Plan, Sink, Solved, Solver};
 use clap::Args;
+use exports::ExportOptions;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
 use starpipe::report::LensReport;
@@ -27,6 +29,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     starpipe calibrate night/ -o camera.toml\n  \
     starpipe calibrate --site 52.22,4.42 --camera camera.toml night/*.fits -o camera.toml --force\n  \
+    starpipe calibrate night/ --opencv lens.yaml\n  \
     starpipe process --camera camera.toml night.fits\n\n\
     Twenty frames or more, whose stars are spread over the whole frame, measure a lens well. `process`, `track` and\n\
     `identify` hold the lens that is in the file given with --camera.")]
@@ -42,8 +45,8 @@ pub(crate) struct CalibrateArgs {
     /// File for the lens: the description given with --camera, if any, with a table [lens]
     #[arg(short, long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Overwrite the file
-    #[arg(long, requires = "out")]
+    /// Overwrite files
+    #[arg(long)]
     force: bool,
     /// Figure of the stars over the frame, and of their residuals
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
@@ -52,12 +55,17 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
     format: PageFormat,
     #[command(flatten)]
+    exports: ExportOptions,
+    #[command(flatten)]
     catalog: CatalogOptions,
 }
 
 /// `starpipe calibrate`
 pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandError> {
-    lens_file::check(arguments.out.as_deref(), arguments.force)?;
+    if !arguments.force {
+        let files = arguments.out.as_deref().into_iter();
+        lens_file::check(files.chain(arguments.exports.paths()))?;
+    }
     let plan = arguments.plan()?;
     let (paths, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
     let (frames, left_out, unread) = solve(&arguments, &plan, &paths)?;
@@ -148,7 +156,7 @@ fn solve(
 }
 
 fn write(arguments: &CalibrateArgs, measured: &LensCalibration) -> Result<(), CommandError> {
-    let mut files = Vec::new();
+    let mut files = arguments.exports.files(measured)?;
     if let Some(path) = &arguments.out {
         let text = lens_file::text(arguments.hints.camera.as_deref(), measured)?;
         files.push((path.clone(), text.into_bytes()));

@@ -3,12 +3,17 @@
 use super::observer::ObserverOptions;
 use super::values;
 use crate::cli::exit::CommandError;
+use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use starpipe::base::epoch::ObservationDate;
 use starpipe::camera::data_sheet::CameraDescription;
+use starpipe::camera::{CameraModel, KnownLens};
+use starpipe::lens::formats::{from_opencv_yaml_within, from_platepar_within};
 use starpipe::pipeline::SolveOptions;
 use starpipe::sky::places::AttitudeFrame;
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What is known of the frames")]
@@ -41,8 +46,9 @@ pub(crate) struct HintOptions {
     frame_of: FrameOf,
     /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and
     /// a predicted limiting magnitude for frames whose exposure is known. Its lens, where
-    /// `starpipe calibrate` has measured one, is held
-    #[arg(long, value_name = "FILE.toml")]
+    /// `starpipe calibrate` has measured one, is held. Also a lens of OpenCV or ROS (.yaml), or a platepar
+    /// of RMS (.cal)
+    #[arg(long, value_name = "FILE")]
     pub(crate) camera: Option<PathBuf>,
     /// Fit the lens to each frame, although --camera has one that `starpipe calibrate` measured
     #[arg(long, requires = "camera")]
@@ -66,6 +72,10 @@ impl From<FrameOf> for AttitudeFrame {
         }
     }
 }
+
+/// Largest error of a lens that is read from a file of another program: well below those that it is
+/// taken to have.
+const READ_WITHIN_PX: f64 = 0.1;
 
 impl HintOptions {
     /// The defaults with the hints that are given.
@@ -91,9 +101,31 @@ impl HintOptions {
 
     /// The camera, if one is given.
     pub(crate) fn description(&self) -> anyhow::Result<Option<CameraDescription>> {
-        let read = |path: &PathBuf| Ok(CameraDescription::read(path)?);
+        let read = |path: &PathBuf| match path.extension().and_then(OsStr::to_str) {
+            Some("yaml" | "yml") => lens_of(path, |text| {
+                Ok(from_opencv_yaml_within(text, READ_WITHIN_PX)?)
+            }),
+            Some("cal" | "json") => lens_of(path, |text| {
+                Ok(from_platepar_within(text, READ_WITHIN_PX)?.0)
+            }),
+            _ => Ok(CameraDescription::read(path)?),
+        };
         self.camera.as_ref().map(read).transpose()
     }
+}
+
+/// The lens in a file of another program.
+fn lens_of(
+    path: &Path,
+    read: impl FnOnce(&str) -> anyhow::Result<CameraModel>,
+) -> anyhow::Result<CameraDescription> {
+    let in_file = || format!("reading {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(in_file)?;
+    let camera = read(&text).with_context(in_file)?;
+    Ok(CameraDescription {
+        sheet: None,
+        lens: KnownLens::with_assumed_errors(camera).map(Arc::new),
+    })
 }
 
 /// Replaces a default by what is given.

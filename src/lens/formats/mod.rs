@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | OpenCV `FileStorage` (cv, cv::fisheye) | [`opencv_yaml`] | [`from_opencv_yaml`] |
 //! | ROS `camera_info` | [`ros_camera_info`] | [`from_opencv_yaml`] |
-//! | RMS platepar | [`platepar`] | [`from_platepar`] |
+//! | RMS platepar | [`platepar()`] | [`from_platepar`] |
 //! | indi-allsky's lens and `VIRTUALSKY` settings | [`indi_allsky_json`] | |
 //!
 //! What a format can say exactly is converted exactly. Everything else is fitted over what the frame

@@ -1,6 +1,6 @@
 //! OpenCV: the camera matrix K and the distortion D of `cv::projectPoints` and of `cv::fisheye`.
 //!
-//! [`CameraModel`] → [`CvLens`] → `FileStorage` YAML, and the same way back.
+//! [`CameraModel`](crate::CameraModel) → [`CvLens`] → `FileStorage` YAML, and the same way back.
 //!
 //! With x, y, z along the axes of the lens, a = x/z, b = y/z, r² = a² + b² and θ = atan r:
 //!

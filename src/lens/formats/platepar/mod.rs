@@ -1,6 +1,6 @@
 //! RMS platepar: the lens and the pointing of a meteor camera (Raspberry Pi Meteor Station).
 //!
-//! ([`CameraModel`], [`Pointing`]) ↔ JSON of distortion types `radial…-odd` and `poly3+radial…`
+//! ([`CameraModel`](crate::CameraModel), [`Pointing`]) ↔ JSON of distortion types `radial…-odd` and `poly3+radial…`
 
 mod plate;
 mod read;
@@ -16,7 +16,7 @@ use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;
 
 /// Where a camera looked, from where, and when.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pointing {
     /// Attitude relative to the directions of the catalogue, as in reports: what is in the boresight has
     /// these coordinates.
