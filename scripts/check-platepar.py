@@ -109,20 +109,20 @@ def compare(plate, stars):
 
 
 def print_examples():
-    plate = dict(X_res=1280, Y_res=720, F_scale=14.25, lat=45.1, lon=15.2, JD=2460310.4375, RA_d=83.5,
-                 dec_d=22.25, pos_angle_ref=47.5, refraction=True, force_distortion_centre=False,
-                 equal_aspect=False, asymmetry_corr=False)
-    radial7 = dict(distortion_type="radial7-odd", x_poly_rev=[0.004, -0.003, 0.002, 0.02, -0.01, 0.003],
-                   y_poly_rev=[0] * 6)
-    radial9 = dict(distortion_type="radial9-odd", equal_aspect=True, y_poly_rev=[0] * 6,
-                   x_poly_rev=[0.004, -0.003, 0.02, -0.01, 0.003, 0.0005])
+    plate = {"X_res": 1280, "Y_res": 720, "F_scale": 14.25, "lat": 45.1, "lon": 15.2, "JD": 2460310.4375, "RA_d": 83.5,
+                 "dec_d": 22.25, "pos_angle_ref": 47.5, "refraction": True, "force_distortion_centre": False,
+                 "equal_aspect": False, "asymmetry_corr": False}
+    radial7 = {"distortion_type": "radial7-odd", "x_poly_rev": [0.004, -0.003, 0.002, 0.02, -0.01, 0.003],
+                   "y_poly_rev": [0] * 6}
+    radial9 = {"distortion_type": "radial9-odd", "equal_aspect": True, "y_poly_rev": [0] * 6,
+                   "x_poly_rev": [0.004, -0.003, 0.02, -0.01, 0.003, 0.0005]}
     x = [-2.5, 0.004, 0.02, 3e-6, -2e-6, 1e-6, 2e-8, 1e-9, 1.8e-8, -2e-9, 1e-9, 0.0]
     y = [1.25, -0.018, 0.003, 1e-6, 2e-6, -3e-6, 1e-9, 2.1e-8, -1e-9, 1.9e-8, 1e-9, 0.0]
-    polynomial = dict(distortion_type="poly3+radial", x_poly_rev=x, y_poly_rev=y)
-    for other in [radial7, radial7 | dict(refraction=False), radial9, polynomial]:
+    polynomial = {"distortion_type": "poly3+radial", "x_poly_rev": x, "y_poly_rev": y}
+    for other in [radial7, radial7 | {"refraction": False}, radial9, polynomial]:
         print(other["distortion_type"])
         for star in [(83, 22), (60, 40), (100, 45), (70, -5), (105, 5)]:
-            print("  %.5f %.5f" % pixel(plate | other, *star))
+            print("  {:.5f} {:.5f}".format(*pixel(plate | other, *star)))
 
 
 if len(sys.argv) == 3:

@@ -58,8 +58,11 @@ def calibrate(results: Iterable[Result]) -> LensCalibration:
     ValueError
         If no frame is identified, or the stars do not determine a lens.
     """
-    solved = [result.__dict__.get("_solved") for result in results]
-    if None in solved:
-        raise ValueError("a result that was restored by pickle has no stars to calibrate with")
+    solved: list[_starpipe.Solved] = []
+    for result in results:
+        found: _starpipe.Solved | None = result.__dict__.get("_solved")
+        if found is None:
+            raise ValueError("a result that was restored by pickle has no stars to calibrate with")
+        solved.append(found)
     report, toml = _starpipe.calibrate(solved)
     return LensCalibration(json.loads(report), toml)

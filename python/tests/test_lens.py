@@ -15,9 +15,7 @@ DATE = "2000-01-01T12:00:00"
 
 def night(numbers: range) -> list[sp.Simulation]:
     lens = {"distortion_px": -30.0, "axis_x_px": 12.0}
-    return [
-        sp.simulate(CAMERA, date=DATE, seed=5, frame=number, **lens) for number in numbers
-    ]
+    return [sp.simulate(CAMERA, date=DATE, seed=5, frame=number, **lens) for number in numbers]
 
 
 def test_a_lens_is_measured_saved_and_held(tmp_path: Path) -> None:
