@@ -135,7 +135,7 @@ def solve_options(
     date = header_date(header) if date is None else date
     exposure = header_exposure(header) if exposure is None else exposure
     return {
-        "fov_deg": positive(fov, "deg", "fov", 179.0),
+        "fov_deg": positive(fov, "deg", "fov", 360.0),
         "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
         "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
         "near_deg": direction(near),

@@ -349,16 +349,21 @@ impl Distortion {
 
     /// The largest displacement on a circle of radius R, without that of the axis, in pixels.
     pub fn largest_px(&self) -> f64 {
+        self.largest_at_px(self.radius_px)
+    }
+
+    /// The same on a circle of this radius.
+    pub(crate) fn largest_at_px(&self, radius_px: f64) -> f64 {
         let [axis_u, axis_v] = self.axis_offset_px();
         (0..64)
             .map(|step| {
                 let (sin, cos) = libm::sincos(f64::from(step) / 64.0 * std::f64::consts::TAU);
-                let edge = [self.radius_px * cos, self.radius_px * sin];
+                let edge = [radius_px * cos, radius_px * sin];
                 let moved = self
                     .apply(edge)
                     .map(|[u, v]| libm::hypot(u - axis_u - edge[0], v - axis_v - edge[1]));
                 // Where the image folds nothing is seen.
-                moved.unwrap_or(self.radius_px)
+                moved.unwrap_or(radius_px)
             })
             .fold(0.0, f64::max)
     }

@@ -209,6 +209,36 @@ impl CameraModel {
         libm::hypot(self.width_px, self.height_px) / 2.0
     }
 
+    /// Whether a corner of the frame sees the sky.
+    pub(crate) fn fills_frame(&self) -> bool {
+        self.corners()
+            .iter()
+            .any(|corner| self.direction_of(corner).is_some())
+    }
+
+    /// Distance from the centre of the frame to where its field ends, in pixels: its corners, or the edge of
+    /// an all-sky lens.
+    pub(crate) fn field_radius_px(&self) -> f64 {
+        if self.fills_frame() {
+            return self.radius_px();
+        }
+        // Just inside.
+        let (sin, cos) = libm::sincos((1.0 - 1e-9) * self.max_angle_rad);
+        let edge = self.pixel_of(&UnitVector::from_unit(Vector3::new(sin, 0.0, cos)));
+        edge.map_or(self.radius_px(), |edge| edge.distance_to(&self.axis()))
+    }
+
+    /// The largest displacement by the distortion where the field ends, without that of the axis, in pixels.
+    pub(crate) fn largest_distortion_px(&self) -> f64 {
+        let ideal_px = if self.fills_frame() {
+            self.radius_px()
+        } else {
+            self.focal_length_px * self.projection.radius(self.max_angle_rad)
+        };
+        let distortion = self.distortion.as_ref();
+        distortion.map_or(0.0, |distortion| distortion.largest_at_px(ideal_px))
+    }
+
     /// Distance of `pixel` from the centre over that of the corner, squared.
     pub fn off_centre_sq(&self, pixel: &PixelPoint) -> f64 {
         let [u, v] = self.offset_of(pixel);

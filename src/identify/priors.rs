@@ -4,7 +4,7 @@ use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
-use crate::camera::{self, Distortion, KnownLens};
+use crate::camera::{self, Distortion, KnownLens, Projection};
 use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
 use nalgebra::Vector3;
@@ -175,18 +175,39 @@ impl ScalePrior {
 
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians.
     pub fn pixel_scale_range_rad(&self, width_px: f64) -> [f64; 2] {
-        let pixel_rad = |factor: f64| match self.scale {
+        let factors = [1.0 - self.tolerance, 1.0 + self.tolerance];
+        match self.scale {
+            Scale::Pixel(pixel_rad) => factors.map(|factor| pixel_rad * factor),
             Scale::FieldOfView(fov_rad) => {
-                let fov_rad = (fov_rad * factor).min(MAX_FOV_RAD);
-                1.0 / camera::focal_length_px(width_px, fov_rad)
+                let [low_rad, high_rad] = factors.map(|factor| fov_rad * factor);
+                let [low, _] = scales_of_field(low_rad, width_px);
+                let [_, high] = scales_of_field(high_rad, width_px);
+                [low, high]
             }
-            Scale::Pixel(pixel_rad) => pixel_rad * factor,
-        };
-        [
-            pixel_rad(1.0 - self.tolerance),
-            pixel_rad(1.0 + self.tolerance),
-        ]
+        }
     }
+}
+
+/// Smallest and largest pixel scale at the centre, in radians, of lenses with this field across this width:
+/// of a pinhole alone, unless it is wide.
+fn scales_of_field(fov_rad: f64, width_px: f64) -> [f64; 2] {
+    /// Wider fields may be those of any lens.
+    const WIDE_RAD: f64 = 100.0 * RAD_PER_DEG;
+    /// The field may be a circle that is smaller than the frame by this much.
+    const CIRCLE: f64 = 2.0;
+    let pinhole = 1.0 / camera::focal_length_px(width_px, fov_rad.min(MAX_FOV_RAD));
+    if fov_rad < WIDE_RAD {
+        return [pinhole; 2];
+    }
+    let half_rad = fov_rad / 2.0;
+    let others = Projection::ALL.into_iter().skip(1);
+    let others = others.filter(|lens| half_rad <= lens.max_angle_rad());
+    let radii = others.map(|lens| lens.radius(half_rad));
+    let (least, most) = radii.fold((f64::INFINITY, 0.0), |(least, most): (f64, f64), radius| {
+        (least.min(radius), most.max(radius))
+    });
+    let [least, most] = [least, most].map(|radius| 2.0 * radius / width_px);
+    [least.min(pinhole), CIRCLE * most.max(pinhole)]
 }
 
 impl Priors {
@@ -258,6 +279,19 @@ mod tests {
     fn a_range_of_scales_is_kept() {
         let [low, high] = ScalePrior::between(1e-5, 4e-5).pixel_scale_range_rad(9.0);
         assert!((low - 1e-5).abs() < 1e-18 && (high - 4e-5).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_field_of_the_whole_sky_may_be_that_of_any_lens_that_sees_it() {
+        let prior = ScalePrior::by_user(Scale::FieldOfView(180.0 * RAD_PER_DEG), 0.05);
+        let [low, high] = prior.pixel_scale_range_rad(1000.0);
+        for lens in Projection::ALL.into_iter().skip(1) {
+            let pixel_rad = 2.0 * lens.radius(std::f64::consts::FRAC_PI_2) / 1000.0;
+            assert!((low..=high).contains(&pixel_rad), "{lens:?}");
+        }
+        // A circle across 700 of the pixels.
+        assert!((low..=high).contains(&(std::f64::consts::PI / 700.0)));
+        assert!(low > 0.5e-3 && high < 0.5);
     }
 
     #[test]

@@ -45,6 +45,7 @@ pub const NAME_ODDS: f64 = 100.0;
 ///
 /// # Example
 /// ```
+/// use starpipe::sky::places::StarPlaces;
 /// use starpipe::detect::{self, Detection, DetectConfig, detect};
 /// use starpipe::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 /// use starpipe::{Catalog, IndexedCatalog, Priors, frame, identify};

@@ -73,9 +73,16 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         completeness::measure(&counted.collect::<Vec<_>>(), chance)
     };
     let by_v = counted(&|star| star.v_mag);
+    // Where the field of an all-sky lens ends, in units of the distance of the corners.
+    let camera = &frame.identification.camera;
+    let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
     let standards: Vec<StandardStar> = clear
         .iter()
         .filter_map(|star| standard_star(star, &by_v, frame, sky))
+        .map(|star| StandardStar {
+            off_centre_sq: star.off_centre_sq / edge_sq,
+            ..star
+        })
         .collect();
     let mut zero_point = zero_point::measure(&standards);
     if let (Some(zero_point), Some(wings)) = (&mut zero_point, frame.detections.wings) {

@@ -378,7 +378,7 @@ impl fmt::Display for Note {
             ),
             Self::Vignetting(loss) => write!(
                 f,
-                "stars in the corners are {:.2} ± {:.2} mag dimmer than in the centre, for which the zero point holds",
+                "stars at the edge of the field are {:.2} ± {:.2} mag dimmer than in the centre, for which the zero point holds",
                 loss.value, loss.sigma
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),

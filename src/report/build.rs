@@ -233,7 +233,7 @@ pub(super) fn distortion(camera: &CameraModel) -> Option<DistortionReport> {
         model: distortion.model().name(),
         focal_length_px: to_decimals(camera.focal_length_px(), PIXEL_DECIMALS),
         radius_px: to_decimals(distortion.radius_px(), PIXEL_DECIMALS),
-        largest_px: to_decimals(distortion.largest_px(), PIXEL_DECIMALS),
+        largest_px: to_decimals(camera.largest_distortion_px(), PIXEL_DECIMALS),
         coefficients_px: coefficients.map(|c| to_decimals(*c, 6)).collect(),
     })
 }

@@ -217,7 +217,8 @@ pub struct DistortionReport {
     pub focal_length_px: f64,
     /// Radius at which a normalised offset is 1, in pixels.
     pub radius_px: f64,
-    /// Largest displacement at that radius, without that of the axis, in pixels.
+    /// Largest displacement in the corners, or where an all-sky lens ends, without that of the axis, in
+    /// pixels.
     pub largest_px: f64,
     /// The coefficients in pixels, in the model's order.
     pub coefficients_px: Vec<f64>,

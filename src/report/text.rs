@@ -228,12 +228,22 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     let distortion = match &optics.distortion {
         None => "none measurable".to_owned(),
         Some(lens) => format!(
-            "{}, up to {:.2} px in the corners",
-            lens.model, lens.largest_px
+            "{}, up to {:.2} px {}",
+            lens.model,
+            lens.largest_px,
+            edge_of_field(optics)
         ),
     };
     lines.push(labelled("distortion", &distortion));
     lines
+}
+
+/// Where a field ends.
+fn edge_of_field(optics: &OpticsReport) -> &'static str {
+    match optics.valid_to_deg {
+        None => "in the corners",
+        Some(_) => "at the edge of the field",
+    }
 }
 
 fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {

@@ -47,6 +47,8 @@ pub struct StarPlaces {
 struct Refraction {
     air: Air,
     zenith: UnitVector<Icrs>,
+    /// On the horizon.
+    north: UnitVector<Icrs>,
 }
 
 /// Which directions an attitude refers to.
@@ -90,6 +92,7 @@ impl StarPlaces {
             refraction: in_space.map(|(air, site)| Refraction {
                 air,
                 zenith: site.zenith,
+                north: site.north,
             }),
         }
     }
@@ -130,6 +133,20 @@ impl StarPlaces {
             .map(|refraction| &refraction.zenith)
     }
 
+    /// What appears in a direction of the site's sky, if it is known: the azimuth is from north through
+    /// east.
+    pub fn in_horizon(&self, azimuth_rad: f64, altitude_rad: f64) -> Option<UnitVector<Icrs>> {
+        let Refraction { zenith, north, .. } = self.refraction.as_ref()?;
+        let (zenith, north) = (zenith.as_vector(), north.as_vector());
+        let east = north.cross(zenith);
+        let (sin_azimuth, cos_azimuth) = libm::sincos(azimuth_rad);
+        let (sin_altitude, cos_altitude) = libm::sincos(altitude_rad);
+        let along = north * cos_azimuth + east * sin_azimuth;
+        Some(UnitVector::from_vector(
+            along * cos_altitude + zenith * sin_altitude,
+        ))
+    }
+
     /// Whether the air's horizon hides an apparent direction.
     pub fn is_below_horizon(&self, apparent: &UnitVector<Icrs>) -> bool {
         self.zenith()
@@ -157,7 +174,7 @@ impl StarPlaces {
                 seen.as_vector() * inverse_gamma + velocity_c * (1.0 + along),
             );
         }
-        if let Some(Refraction { air, zenith }) = &self.refraction {
+        if let Some(Refraction { air, zenith, .. }) = &self.refraction {
             let cosine = seen.dot(zenith);
             let per_sine = air.refraction_per_sine(cosine);
             let square = per_sine * per_sine * (1.0 - cosine * cosine);

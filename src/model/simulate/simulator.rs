@@ -39,6 +39,7 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
 ///
 /// # Example
 /// ```
+/// use starpipe::sky::places::StarPlaces;
 /// use starpipe::camera::data_sheet::DataSheet;
 /// use starpipe::model::sensitivity::Scenario;
 /// use starpipe::model::simulate::{Pointing, Setup, Simulator};

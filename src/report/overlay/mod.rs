@@ -8,7 +8,8 @@
 //!    whole factors.
 //! 2. Every detection gets a ring: identified, not identified, or not a star.
 //! 3. Names and V magnitudes are placed where there is room, brightest first.
-//! 4. A strip below the frame shows file, centre and field, the meaning of the rings, a scale bar,
+//! 4. Where site and time are known: zenith, horizon and cardinal points.
+//! 5. A strip below the frame shows file, centre and field, the meaning of the rings, a scale bar,
 //!    and north and east at the frame's centre.
 //!
 //! Caveats: the scale is that of the frame's centre. A pixel is drawn as an area: the centre of
@@ -16,6 +17,7 @@
 
 mod canvas;
 mod grey;
+mod horizon;
 mod labels;
 mod legend;
 mod mark;
@@ -57,6 +59,9 @@ pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) 
     for mark in marks.iter().rev() {
         let color = mark.kind.color();
         canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), color);
+    }
+    if let Some(found) = solution.outcome.identification() {
+        horizon::draw(&mut canvas, &grey, found);
     }
     let image = [grey.width as f32, grey.height as f32];
     let letters = MarkKind::Identified.color().lighter();

@@ -38,6 +38,8 @@ pub(crate) struct SiteInSpace {
     /// By the Earth's rotation.
     pub velocity_km_s: Vector3<f64>,
     pub zenith: UnitVector<Icrs>,
+    /// On the horizon.
+    pub north: UnitVector<Icrs>,
 }
 
 /// The velocity of the Earth's centre relative to the solar system's barycentre, in ICRS axes, in units
@@ -146,7 +148,7 @@ impl Site {
         const FLATTENING: f64 = 1.0 / 298.257_223_563;
         const POLAR_SHARE: f64 = (1.0 - FLATTENING) * (1.0 - FLATTENING);
         const ROTATION_RAD_S: f64 = 7.292_115e-5;
-        let [_, _, up] = self.north_east_up();
+        let [north, _, up] = self.north_east_up();
         let sin_lat = up.z;
         let normal_km =
             EQUATORIAL_RADIUS_KM / (1.0 - (1.0 - POLAR_SHARE) * sin_lat * sin_lat).sqrt();
@@ -162,6 +164,7 @@ impl Site {
             place_km: to_terrestrial.tr_mul(&terrestrial_km),
             velocity_km_s: to_terrestrial.tr_mul(&velocity_km_s),
             zenith: UnitVector::from_vector(to_terrestrial.tr_mul(&up)),
+            north: UnitVector::from_vector(to_terrestrial.tr_mul(&north)),
         }
     }
 

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD, RAD_PER_DEG};
+use crate::sky::observer::Observation;
 use proptest::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 
 /// The deflection of light by the Sun is neglected.
 const TOLERANCE_ARCSEC: f64 = 0.03;
@@ -87,6 +89,20 @@ fn angles_through_the_air_are_those_of_astropy() {
         // SOFA's formula is itself 0.1″ off at 15° above the horizon.
         assert!(off_arcsec.abs() < 0.3, "{date}: {off_arcsec}");
     }
+}
+
+#[test]
+fn a_place_in_the_horizon_is_where_an_observation_has_it() {
+    let date = "2019-07-29T20:47:26Z";
+    let site = Site::new(52.22, 4.42, 0.0).unwrap();
+    let places = places(date, [52.22, 4.42, 0.0]);
+    let vega = direction([279.2347, 38.7837]);
+    let seen = Observation::new(site, &date.parse().unwrap(), &vega).unwrap();
+    let zenith_distance_rad = seen.apparent.unwrap().zenith_distance_rad;
+    let place = places.in_horizon(seen.azimuth_rad, FRAC_PI_2 - zenith_distance_rad);
+    let off_arcsec = place.unwrap().angle_to(&places.apparent(&vega)) * ARCSEC_PER_RAD;
+    // An observation neglects the Earth's rotation.
+    assert!(off_arcsec < 0.4, "{off_arcsec}");
 }
 
 #[test]
