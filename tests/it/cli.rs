@@ -100,7 +100,7 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
         (&["process", "--scale-error", "5", "a.png"], "--scale-error"),
         (&["process", "--fov", "NaN", "a.png"], "NaN"),
         (&["process", "--fov", "-10", "a.png"], "field of view"),
-        (&["process", "--fov", "180", "a.png"], "field of view"),
+        (&["process", "--fov", "360", "a.png"], "field of view"),
         (&["process", "--pixel-scale", "0", "a.png"], "pixel scale"),
         (
             &["process", "--fov", "10", "--scale-error", "100", "a.png"],

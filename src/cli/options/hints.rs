@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[command(next_help_heading = "What is known of the frames")]
 pub(crate) struct HintOptions {
     /// Horizontal field of view in degrees
-    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true,
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_any_lens, allow_hyphen_values = true,
           conflicts_with = "pixel_scale")]
     pub(crate) fov: Option<f64>,
     /// Angle of a pixel in arcseconds

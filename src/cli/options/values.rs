@@ -108,6 +108,16 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     within(
         text,
         "the field of view",
+        |v| v > 0.0 && v < 180.0,
+        "above 0 and below 180 degrees",
+    )
+}
+
+/// The same of any lens, in degrees.
+pub(crate) fn field_of_any_lens(text: &str) -> Result<f64, String> {
+    within(
+        text,
+        "the field of view",
         |v| v > 0.0 && v < 360.0,
         "above 0 and below 360 degrees",
     )
