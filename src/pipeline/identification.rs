@@ -62,22 +62,42 @@ pub(super) fn identify_stars(
     (outcome, dropped_scale)
 }
 
-/// Identifies a frame with these places. Without refraction where that fails, or shows stars through the
-/// ground: then the time or the site is wrong. Also returns the places that were used last.
+/// Identifies a frame with these places. Where that fails, shows stars through the ground, or explains them
+/// badly, the time or the site may be wrong, and refraction with it: then also without air, and the answer
+/// with more stars counts. Also returns the places that it was found with.
 pub(super) fn through_air_or_not(
     places: StarPlaces,
     mut identify: impl FnMut(StarPlaces) -> Outcome,
 ) -> (Outcome, StarPlaces) {
     let outcome = identify(places);
-    let is_above = |outcome: &Outcome| {
-        let found = outcome.identification();
-        found.is_some_and(|found| !places.is_below_horizon(&found.icrs_to_camera.boresight()))
-    };
-    if !places.has_refraction() || is_above(&outcome) {
+    if !places.has_refraction() || outcome.identification().is_some_and(is_credible_in_air) {
         return (outcome, places);
     }
     let airless = places.without_refraction();
-    (identify(airless), airless)
+    let without = identify(airless);
+    let is_above = |found: &&Identification| {
+        let boresight = found.icrs_to_camera.boresight();
+        !places.is_below_horizon(&boresight)
+    };
+    let stars = |found: &Identification| found.matches.len();
+    let in_air = outcome.identification().filter(is_above).map(stars);
+    if in_air > without.identification().map(stars) {
+        (outcome, places)
+    } else {
+        (without, airless)
+    }
+}
+
+/// Whether an answer with refraction needs no other: the frame is well above the horizon, and no error
+/// but that of the centroids is in the residuals.
+fn is_credible_in_air(found: &Identification) -> bool {
+    /// Cosine of 70° from the zenith: nearer to the horizon a wrong time changes refraction much.
+    const LOW: f64 = 0.34;
+    const RESIDUAL_PX: f64 = 0.05;
+    let boresight = found.icrs_to_camera.boresight();
+    let zenith = found.places.zenith();
+    let is_high = zenith.is_some_and(|zenith| zenith.dot(&boresight) > LOW);
+    is_high && found.excess_sigma_px < RESIDUAL_PX
 }
 
 /// Whether every star of an identified frame is there twice. Then the attitude is that of one of the
