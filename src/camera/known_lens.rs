@@ -140,23 +140,14 @@ mod tests {
     use crate::base::coords::UnitVector;
     use crate::camera::{Distortion, Projection};
 
-    fn lens() -> KnownLens {
+    #[test]
+    fn a_camera_that_sees_the_same_in_the_centre_has_a_like_attitude() {
         let model = DistortionModel::Radial5;
         let distortion = Distortion::new(model, 640.0, &[-12.5, 1.0 / 3.0]);
         let camera = CameraModel::pinhole(1024.0, 768.0, 700.1, true)
             .with_projection(Projection::Equisolid)
-            .with_distortion(Some(distortion))
-            .limited_to(1.3);
-        let mut covariance =
-            DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![1e-10, 0.01, 0.04]));
-        covariance[(0, 1)] = 1e-7;
-        covariance[(1, 0)] = 1e-7;
-        KnownLens::new(camera, covariance).unwrap()
-    }
-
-    #[test]
-    fn a_camera_that_sees_the_same_in_the_centre_has_a_like_attitude() {
-        let lens = lens();
+            .with_distortion(Some(distortion));
+        let lens = KnownLens::with_assumed_errors(camera).unwrap();
         let other = CameraModel::pinhole(1024.0, 768.0, 700.0, true);
         let attitude = Rotation::looking_at(&UnitVector::from_ra_dec(1.0, 0.2), 0.7);
         let like = lens.attitude_like(&other, &attitude).unwrap();

@@ -216,6 +216,15 @@ impl CameraModel {
             .any(|corner| self.direction_of(corner).is_some())
     }
 
+    /// The angle from the axis up to which the lens is known, unless it is known up to all corners.
+    pub(crate) fn valid_to_rad(&self) -> Option<f64> {
+        let corners = self.corners();
+        let sees_all = corners
+            .iter()
+            .all(|corner| self.direction_of(corner).is_some());
+        (!sees_all).then_some(self.max_angle_rad)
+    }
+
     /// Distance from the centre of the frame to where its field ends, in pixels: its corners, or the edge of
     /// an all-sky lens.
     pub(crate) fn field_radius_px(&self) -> f64 {

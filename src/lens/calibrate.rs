@@ -1,7 +1,7 @@
 //! The calibration: frames are sorted out, the lens is chosen and fitted.
 
 use super::coverage::Coverage;
-use super::cross_validation::best_lens;
+use super::cross_validation::{best_lens, rms_px};
 use super::formats::Pointing;
 use super::frames::{LeftOutFrame, LensFrame, Unfit};
 use super::mount::Mount;
@@ -193,18 +193,17 @@ impl Fitted {
         let start = richest.camera;
         // Residuals tell the errors, and these weigh the stars for the choice of a lens.
         let first = fit_jointly(&stated, &start, start.distortion_model())?;
-        let excess_sigma_px = excess_sigma_px(&stated, &first);
-        let weighted = weighted(&stated, &first, excess_sigma_px);
+        let (_, weighted) = reweighed(&stated, &first);
         let tested = best_lens(&weighted, &first.camera)?;
         let mut fit = fit_jointly(
             &weighted,
             &first.camera.reprojected(tested.projection),
             tested.model,
         )?;
-        let mut excess_sigma_px = excess_sigma_px;
+        let mut excess_sigma_px = 0.0;
         for _ in 0..ROUNDS {
-            excess_sigma_px = self::excess_sigma_px(&stated, &fit);
-            let weighted = self::weighted(&stated, &fit, excess_sigma_px);
+            let weighted;
+            (excess_sigma_px, weighted) = reweighed(&stated, &fit);
             fit = fit_jointly(&weighted, &fit.camera, tested.model)?;
         }
         let distances_px = fit.residuals_px.iter().map(|residuals| {
@@ -262,7 +261,7 @@ impl Fitted {
             .map(|(frame, residuals)| UsedFrame {
                 name: frame.name.clone(),
                 stars: frame.stars(),
-                rms_px: rms_px(residuals.iter()),
+                rms_px: rms_of(residuals.iter()),
                 scale: FrameScale::of(frame, &fit.camera, excess_sigma_px),
                 pointing: frame.pointing(),
             });
@@ -276,7 +275,7 @@ impl Fitted {
             drift: ScaleDrift::of(&dated.collect::<Vec<_>>()),
             mount: Mount::of(&frames),
             stars: frames.iter().map(LensFrame::stars).sum(),
-            rms_px: rms_px(fit.residuals_px.iter().flatten()),
+            rms_px: rms_of(fit.residuals_px.iter().flatten()),
             lens: KnownLens::new(camera, fit.covariance)?,
             frames: used,
             left_out,
@@ -316,14 +315,15 @@ fn limited(camera: &CameraModel, frames: &[LensFrame]) -> CameraModel {
     }
 }
 
-/// Standard deviation of residuals on each axis, from their median distance.
-fn rms_px<'a>(residuals: impl Iterator<Item = &'a [f64; 2]>) -> f64 {
-    let mut squares: Vec<f64> = residuals.map(|[x, y]| x * x + y * y).collect();
-    (median(&mut squares) / (2.0 * LN_2)).sqrt()
+/// Standard deviation of residuals on each axis.
+fn rms_of<'a>(residuals: impl Iterator<Item = &'a [f64; 2]>) -> f64 {
+    rms_px(&mut residuals.map(|[x, y]| x * x + y * y).collect::<Vec<_>>())
 }
 
-/// The stars with errors that explain the residuals of `fit`; outliers have larger ones.
-fn weighted(stated: &[JointFrame], fit: &JointFit, excess_sigma_px: f64) -> Vec<JointFrame> {
+/// The error on each axis that the stated ones lack to explain the residuals of `fit`, and the stars with
+/// it; outliers have larger ones.
+fn reweighed(stated: &[JointFrame], fit: &JointFit) -> (f64, Vec<JointFrame>) {
+    let excess_sigma_px = excess_sigma_px(stated, fit);
     let frames = stated.iter().zip(&fit.attitudes).zip(&fit.residuals_px);
     let weighted = frames.map(|((frame, attitude), residuals)| {
         let mut frame = frame.clone();
@@ -334,7 +334,7 @@ fn weighted(stated: &[JointFrame], fit: &JointFit, excess_sigma_px: f64) -> Vec<
         }
         frame
     });
-    weighted.collect()
+    (excess_sigma_px, weighted.collect())
 }
 
 /// The error on each axis that the stated ones lack to explain the median residual.

@@ -6,6 +6,7 @@ use crate::identify::fit::{
     JointFrame, WIDE_RAD, fit_jointly, is_affordable, least_gain, residuals_px, robust_sigma_px,
     worth_a_projection,
 };
+use std::f64::consts::LN_2;
 
 /// Parts of the stars, of which each is left out once.
 const FOLDS: usize = 5;
@@ -64,6 +65,11 @@ fn best_model(frames: &[JointFrame], start: &CameraModel, stars: usize) -> Optio
     best
 }
 
+/// Standard deviation of residuals on each axis, from their squared distances.
+pub(super) fn rms_px(squares_px2: &mut [f64]) -> f64 {
+    (median(squares_px2) / (2.0 * LN_2)).sqrt()
+}
+
 /// How a lens predicts the stars that are left out.
 fn test(
     frames: &[JointFrame],
@@ -99,6 +105,6 @@ fn test(
         projection: start.projection(),
         model,
         chi_sq,
-        rms_px: (median(&mut squares) / (2.0 * std::f64::consts::LN_2)).sqrt(),
+        rms_px: rms_px(&mut squares),
     })
 }

@@ -4,7 +4,7 @@ use super::formats::Pointing;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::camera::CameraModel;
-use crate::identify::fit::{JointFrame, MeasuredStar};
+use crate::identify::fit::JointFrame;
 use crate::pipeline::{Outcome, Reason, Solution};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
@@ -94,16 +94,6 @@ impl LensFrame {
                 return Err(Unfit::NotIdentified { code });
             }
         };
-        let star = |named: &crate::identify::StarMatch| {
-            let source = solution.source(named.source);
-            let [x, y] = source.measured?.sigma_px;
-            let sigma_px = (0.5 * (x * x + y * y)).sqrt();
-            sigma_px.is_finite().then_some(MeasuredStar {
-                pixel: source.position,
-                icrs: named.light,
-                sigma_px: sigma_px.max(1e-3),
-            })
-        };
         Ok(Self {
             name: name.to_owned(),
             camera: found.camera,
@@ -111,7 +101,7 @@ impl LensFrame {
             date: solution.date.map(|known| known.date),
             observation: solution.observation,
             joint: JointFrame {
-                stars: found.matches.iter().filter_map(star).collect(),
+                stars: solution.measured_stars(found).collect(),
                 icrs_to_camera: found.icrs_to_camera,
             },
         })

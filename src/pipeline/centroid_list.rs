@@ -200,11 +200,11 @@ pub fn solve_centroids(
         source: ScaleSource::User,
         ..ScalePrior::of_camera(&camera.sheet)
     });
-    let [width_px, height_px] = [list.width, list.height].map(|side| side as f64);
-    let lens_scale = context.lens_scale(width_px, height_px);
+    let lens = context.lens_of(list.width, list.height);
+    let lens_scale = lens.map(ScalePrior::of_lens);
     let priors = &Priors {
         scale: context.priors.scale.or(lens_scale).or(of_camera),
-        holds_lens: context.lens_of(width_px, height_px).is_some(),
+        holds_lens: lens.is_some(),
         ..context.priors
     };
     let (list, left_out) = list.usable();

@@ -72,6 +72,7 @@ impl<'a> Context<'a> {
     /// frame's header and the file's name.
     pub(super) fn priors_of(&self, frame: &Frame, name: Option<&Path>) -> Priors {
         let header = &frame.metadata;
+        let lens = self.lens_of(frame.width, frame.height);
         let camera_scale = self.camera.as_ref().map(|camera| &camera.sheet);
         let header_scale = header.pixel_scale_rad().map(ScalePrior::of_header);
         let priors = self
@@ -82,12 +83,10 @@ impl<'a> Context<'a> {
                 DateSource::FileName,
             );
         Priors {
-            holds_lens: self
-                .lens_of(frame.width as f64, frame.height as f64)
-                .is_some(),
+            holds_lens: lens.is_some(),
             scale: priors
                 .scale
-                .or(self.lens_scale(frame.width as f64, frame.height as f64))
+                .or(lens.map(ScalePrior::of_lens))
                 .or(camera_scale.map(ScalePrior::of_camera))
                 .or(header_scale),
             site: priors.site.or(header.site),
@@ -97,15 +96,9 @@ impl<'a> Context<'a> {
     }
 
     /// The lens of frames of this size, where it was measured.
-    pub(super) fn lens_of(&self, width_px: f64, height_px: f64) -> Option<&Arc<KnownLens>> {
-        let lens = self.lens.as_ref();
-        lens.filter(|lens| lens.is_of_size(width_px, height_px))
-    }
-
-    /// The scale of that lens.
-    pub(super) fn lens_scale(&self, width_px: f64, height_px: f64) -> Option<ScalePrior> {
-        let lens = self.lens_of(width_px, height_px);
-        lens.map(|lens| ScalePrior::of_lens(lens))
+    pub(super) fn lens_of(&self, width_px: usize, height_px: usize) -> Option<&KnownLens> {
+        let lens = self.lens.as_deref();
+        lens.filter(|lens| lens.is_of_size(width_px as f64, height_px as f64))
     }
 
     /// How to detect stars in one frame: pixels at the stated camera's full well are saturated.

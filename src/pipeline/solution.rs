@@ -8,7 +8,8 @@ use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
 use crate::detect::{Detection, DetectionFlags};
 use crate::frame::RowOrder;
-use crate::identify::{FrameDate, SourceIndex};
+use crate::identify::fit::MeasuredStar;
+use crate::identify::{FrameDate, Identification, SourceIndex};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::sky::observer::{Observation, Site};
@@ -66,6 +67,23 @@ impl Solution {
     /// If `index` is of another solution and there is no such source.
     pub fn source(&self, index: SourceIndex) -> &Source {
         &self.sources[index.get()]
+    }
+
+    /// The positions of the identified stars, with the directions of their light.
+    pub(crate) fn measured_stars<'a>(
+        &'a self,
+        found: &'a Identification,
+    ) -> impl Iterator<Item = MeasuredStar> + 'a {
+        found.matches.iter().filter_map(|named| {
+            let source = self.source(named.source);
+            let [x, y] = source.measured?.sigma_px;
+            let sigma_px = (0.5 * (x * x + y * y)).sqrt();
+            sigma_px.is_finite().then_some(MeasuredStar {
+                pixel: source.position,
+                icrs: named.light,
+                sigma_px: sigma_px.max(1e-3),
+            })
+        })
     }
 }
 

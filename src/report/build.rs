@@ -207,10 +207,6 @@ pub(super) fn boresight_of(camera: &CameraModel) -> &'static str {
 fn optics(identification: &Identification) -> OpticsReport {
     let camera = &identification.camera;
     let axis = camera.axis();
-    let corners = camera.corners();
-    let sees_all = corners
-        .iter()
-        .all(|corner| camera.direction_of(corner).is_some());
     let degrees = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 6);
     OpticsReport {
         held: identification.lens_is_known,
@@ -221,7 +217,7 @@ fn optics(identification: &Identification) -> OpticsReport {
         focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),
         mirrored: camera.mirrored,
         axis_px: [axis.x, axis.y].map(|along| to_decimals(along, PIXEL_DECIMALS)),
-        valid_to_deg: (!sees_all).then(|| degrees(camera.max_angle_rad())),
+        valid_to_deg: camera.valid_to_rad().map(degrees),
         distortion: distortion(camera),
     }
 }

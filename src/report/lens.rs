@@ -259,17 +259,15 @@ impl LensValues {
         let coefficients = distortion.map_or(&[][..], |distortion| distortion.coefficients_px());
         let sigma = lens.covariance().diagonal();
         let axis = camera.axis();
-        let is_limited = camera
-            .corners()
-            .iter()
-            .any(|corner| camera.direction_of(corner).is_none());
         Self {
             model: camera.projection().name(),
             focal_length_px: to_decimals(camera.central_focal_length_px(), 4),
             focal_length_sigma_px: to_significant(lens.focal_length_sigma_px(), 3),
             mirrored: camera.mirrored,
             axis_px: [axis.x, axis.y].map(|along| to_decimals(along, 3)),
-            valid_to_deg: is_limited.then(|| to_decimals(camera.max_angle_rad() * DEG_PER_RAD, 4)),
+            valid_to_deg: camera
+                .valid_to_rad()
+                .map(|rad| to_decimals(rad * DEG_PER_RAD, 4)),
             distortion: distortion.map(|distortion| distortion.model().name()),
             coefficients_px: coefficients
                 .iter()

@@ -12,7 +12,6 @@ use crate::camera::CameraModel;
 use crate::detect::DetectError;
 use crate::detect::windows::{ExpectedStar, FoundStar, SpotModel, WindowDetector};
 use crate::frame::{Frame, SaturationFinder};
-use crate::identify::fit::MeasuredStar;
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, MIN_STARS, Scale, ScalePrior, ScaleSource,
 };
@@ -357,7 +356,7 @@ impl<'a> Tracker<'a> {
         let old_spot = before.as_ref().and_then(|known| known.spot);
         let mut lens = before.map_or_else(|| LensRefiner::new(found.camera), |known| known.lens);
         lens.add(
-            measured_stars(solution, found),
+            solution.measured_stars(found),
             &found.icrs_to_camera,
             found.excess_sigma_px,
         );
@@ -381,23 +380,6 @@ impl<'a> Tracker<'a> {
         known.spot = known.spot.or(old_spot);
         known
     }
-}
-
-/// The positions of the identified stars, with the directions of their light.
-fn measured_stars<'a>(
-    solution: &'a Solution,
-    found: &'a Identification,
-) -> impl Iterator<Item = MeasuredStar> + 'a {
-    found.matches.iter().filter_map(|named| {
-        let source = solution.source(named.source);
-        let [x, y] = source.measured?.sigma_px;
-        let sigma_px = (0.5 * (x * x + y * y)).sqrt();
-        sigma_px.is_finite().then_some(MeasuredStar {
-            pixel: source.position,
-            icrs: named.light,
-            sigma_px: sigma_px.max(1e-3),
-        })
-    })
 }
 
 impl TrackerState {
