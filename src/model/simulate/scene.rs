@@ -44,6 +44,17 @@ pub struct Scene {
     pub cloud_size_px: f64,
     /// Light that the thickest cloud adds, relative to the clear sky.
     pub cloud_light: f64,
+    /// Altitude up to which trees and houses hide the sky, in degrees; none without them. The zenith
+    /// lies image-up from the centre, at the zenith distance of the scenario.
+    pub skyline_deg: Option<f64>,
+    /// Standard deviation of that altitude along the horizon, in degrees.
+    pub skyline_relief_deg: f64,
+    /// Brightness of trees and houses relative to the clear sky.
+    pub skyline_light: f64,
+    /// Mean number of lamps at the horizon, at or below the altitude of the skyline.
+    pub lamps: f64,
+    /// V magnitude of a lamp.
+    pub lamp_vmag: f64,
     /// Cosmic rays per cm² and second.
     pub cosmic_rays_cm2_s: f64,
     /// Electrons that a cosmic ray leaves per micrometre of its path.
@@ -84,6 +95,11 @@ impl Default for Scene {
             cloud_mag: 0.0,
             cloud_size_px: 200.0,
             cloud_light: 0.0,
+            skyline_deg: None,
+            skyline_relief_deg: 3.0,
+            skyline_light: 0.2,
+            lamps: 0.0,
+            lamp_vmag: -9.0,
             cosmic_rays_cm2_s: 0.0,
             cosmic_ray_e_um: 80.0,
             trails: 0.0,
@@ -224,6 +240,27 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         Limits::NotNegative,
         "light that the thickest cloud adds, relative to the clear sky"
     ),
+    optional_key!(
+        skyline_deg,
+        Limits::FromTo(-90.0, 90.0),
+        "altitude up to which trees and houses hide the sky, in degrees; none without it"
+    ),
+    key!(
+        skyline_relief_deg,
+        Limits::FromTo(0.0, 90.0),
+        "standard deviation of that altitude along the horizon, in degrees"
+    ),
+    key!(
+        skyline_light,
+        Limits::NotNegative,
+        "brightness of trees and houses, relative to the clear sky"
+    ),
+    key!(
+        lamps,
+        Limits::FromTo(0.0, 1000.0),
+        "lamps at the horizon, on average"
+    ),
+    key!(lamp_vmag, MAGNITUDES, "V magnitude of a lamp"),
     key!(
         cosmic_rays_cm2_s,
         Limits::FromTo(0.0, 1e6),

@@ -4,6 +4,7 @@ use super::camera::{Pointing, camera_of};
 use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
+use super::lights::lights;
 use super::motion::Motion;
 use super::pattern::DetectorPattern;
 use super::poisson::PoissonTable;
@@ -27,6 +28,8 @@ use rand_chacha::ChaCha8Rng;
 enum FrameStream {
     Noise,
     Scene,
+    /// [`Skyline`](super::skyline) has number 2.
+    Lights = 3,
 }
 
 fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
@@ -123,6 +126,7 @@ impl<'a> Simulator<'a> {
             sky_gradient: 0.0,
             cloud_mag: 0.0,
             cloud_light: 0.0,
+            skyline_deg: None,
             ..self.scene
         };
         let mut random = random(0, FrameStream::Scene);
@@ -243,6 +247,11 @@ impl<'a> Simulator<'a> {
         let trails = strays::trails(scene, &self.camera, exposure_s, &mut random);
         for trail in &trails {
             self.draw_trail(trail, &sky, &mut image, &mut spot);
+        }
+        let lamps = self::random(seed, FrameStream::Lights);
+        let place = (&self.scenario, scene);
+        for light in lights(place, &self.camera, &self.light, lamps) {
+            light.draw(&mut image);
         }
         let cosmic_rays = strays::cosmic_rays(scene, sheet, &self.camera, exposure_s, &mut random);
         let frame = self.read_out(image, &cosmic_rays, seed)?;

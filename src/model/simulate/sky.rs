@@ -1,13 +1,14 @@
-//! Sky brightness in each pixel, and the transmission of clouds and lens.
+//! Sky brightness in each pixel, and what skyline, clouds and lens let through.
 
 use super::image::ElectronImage;
+use super::lights::moon_direction;
 use super::scene::Scene;
+use super::skyline::Skyline;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
 use crate::camera::data_sheet::lens_transmission;
 use crate::model::sensitivity::{REFERENCE_NM, Scenario};
 use crate::sky::observer::airmass::airmass_krisciunas_schaefer;
-use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -25,6 +26,7 @@ pub(super) struct Sky<'a> {
     slope: [f64; 2],
     clouds: Option<Clouds>,
     moonlight: Option<Moonlight>,
+    skyline: Option<Skyline>,
 }
 
 impl<'a> Sky<'a> {
@@ -47,11 +49,16 @@ impl<'a> Sky<'a> {
             slope: [steepness * sin, -steepness * cos],
             clouds: (scene.cloud_mag > 0.0 || scene.cloud_light > 0.0).then_some(clouds),
             moonlight: Moonlight::new(scenario, scene, camera),
+            skyline: Skyline::new(scenario, scene, camera, random.clone()),
         }
     }
 
-    /// Fraction of a star's light that clouds and lens transmit at `place`.
+    /// Fraction of a star's light that skyline, clouds and lens transmit at `place`.
     pub(super) fn transmission(&self, place: &PixelPoint) -> f64 {
+        let skyline = self.skyline.as_ref();
+        if skyline.is_some_and(|skyline| skyline.hides_place(place)) {
+            return 0.0;
+        }
         let clouds = self
             .clouds
             .as_ref()
@@ -63,7 +70,8 @@ impl<'a> Sky<'a> {
     pub(super) fn expose(&self, image: &mut ElectronImage, sky_e: f64) {
         let is_pinhole = self.camera.is_pinhole();
         let is_even = is_pinhole && self.vignetting == 0.0 && self.slope == [0.0; 2];
-        if is_even && self.clouds.is_none() && self.moonlight.is_none() {
+        let is_open = self.clouds.is_none() && self.skyline.is_none();
+        if is_even && is_open && self.moonlight.is_none() {
             return image.pixels_mut().fill(sky_e);
         }
         let moon = self
@@ -82,6 +90,10 @@ impl<'a> Sky<'a> {
                 let place = PixelPoint::new(x as f64, y as f64);
                 if !is_pinhole && self.camera.direction_of(&place).is_none() {
                     *pixel = 0.0;
+                    continue;
+                }
+                if let Some(skyline) = self.skyline.as_ref().filter(|line| line.hides(x, y)) {
+                    *pixel = sky_e * skyline.light * self.lens(&place);
                     continue;
                 }
                 let gradient = gradient_y + self.slope[0] * (place.x - centre.x);
@@ -202,11 +214,7 @@ impl Moonlight {
     /// nanolamberts by their eq. (1). Extinction is that of the scenario at 555 nm, and the airmass
     /// is constant over the frame.
     fn new(scenario: &Scenario, scene: &Scene, camera: &CameraModel) -> Option<Self> {
-        let distance_rad = scene.moon_distance_deg?.to_radians();
-        let (sin_way, cos_way) = libm::sincos(scene.moon_direction_deg.to_radians());
-        // The direction is that in the image, which a mirror reverses.
-        let sin_way = if camera.mirrored { -sin_way } else { sin_way };
-        let (sin, cos) = libm::sincos(distance_rad);
+        let direction = moon_direction(scene, camera)?;
         let conditions = &scenario.conditions;
         let transmission = conditions.extinction.zenith_transmission(REFERENCE_NM);
         let through = |zenith_distance_deg: f64| {
@@ -219,7 +227,7 @@ impl Moonlight {
         let scattered = moon * (1.0 - through(conditions.zenith_distance_deg));
         let sky = 34.08 * libm::exp(20.7233 - 0.92104 * conditions.sky.mag_arcsec2());
         Some(Self {
-            direction: UnitVector::from_unit(Vector3::new(sin * sin_way, -sin * cos_way, cos)),
+            direction,
             strength: scattered / sky,
         })
     }
