@@ -50,6 +50,7 @@ class Detections:
             "ra_deg",
             "dec_deg",
             "residual_px",
+            "airmass",
             "residual_blend_px",
             "p_chance",
         )

@@ -18,6 +18,8 @@ pub struct Configuration {
     pub dark: Option<FileHash>,
     pub flat: Option<FileHash>,
     pub hot_pixels: Option<FileHash>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mask: Option<FileHash>,
     pub page: Option<String>,
 }
 

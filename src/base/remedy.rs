@@ -9,6 +9,8 @@ use serde::{Serialize, Serializer};
 pub enum Remedy {
     /// Every star is listed.
     AllStars,
+    /// Another catalogue.
+    Catalog,
     /// When the frame was taken.
     Date,
     /// Horizontal field of view.
@@ -34,6 +36,7 @@ impl Remedy {
     pub const fn name(self) -> &'static str {
         match self {
             Self::AllStars => "all_stars",
+            Self::Catalog => "catalog",
             Self::Date => "date",
             Self::Fov => "fov",
             Self::Frame => "frame",

@@ -51,6 +51,8 @@ pub struct Calibration {
     dark: Option<Master>,
     flat: Option<Master>,
     hot_pixels: Option<HotPixelList>,
+    /// Black where the picture does not show the sky.
+    mask: Option<Master>,
     /// The level L that is kept when a flat divides.
     level_adu: f32,
 }
@@ -65,6 +67,8 @@ pub struct Applied {
     pub flat: Option<String>,
     /// The list of hot pixels.
     pub hot_pixels: Option<String>,
+    /// The mask.
+    pub mask: Option<String>,
 }
 
 impl Calibration {
@@ -95,8 +99,16 @@ impl Calibration {
             dark,
             flat: flat.map(normalized).transpose()?,
             hot_pixels,
+            mask: None,
             level_adu,
         })
+    }
+
+    /// The same with a mask: where it is black, the picture as drawn does not show the sky, and its
+    /// pixels have no value.
+    #[must_use]
+    pub fn with_mask(self, mask: Option<Master>) -> Self {
+        Self { mask, ..self }
     }
 
     /// Whether frames are divided by a flat.
@@ -112,6 +124,7 @@ impl Calibration {
             dark: name(&self.dark),
             flat: name(&self.flat),
             hot_pixels: list.map(|list| list.path().display().to_string()),
+            mask: name(&self.mask),
         }
     }
 
@@ -121,7 +134,25 @@ impl Calibration {
     /// [`CalibrationError::TooManyBad`], which leave the frame unchanged;
     /// [`CalibrationError::NothingLeft`].
     pub fn apply(&self, frame: &mut Frame) -> Result<(), CalibrationError> {
-        frame.with_stored(|frame| self.apply_to_stored(frame))
+        if let Some(mask) = &self.mask {
+            check_size("the mask", mask, frame, "the frame")?;
+        }
+        frame.with_stored(|frame| self.apply_to_stored(frame))?;
+        if let Some(mask) = &self.mask {
+            let black = mask.frame.pixels.values().map(|value| value <= 0.0);
+            for (pixel, _) in frame
+                .values_mut()
+                .iter_mut()
+                .zip(black)
+                .filter(|(_, black)| *black)
+            {
+                *pixel = f32::NAN;
+            }
+        }
+        if frame.values().iter().all(|pixel| pixel.is_nan()) {
+            return Err(CalibrationError::NothingLeft);
+        }
+        Ok(())
     }
 
     /// Calibrates a frame in the rows of its file, which are the detector's.
@@ -140,9 +171,6 @@ impl Calibration {
                 let index = y * frame.width + x;
                 frame.values_mut()[index] = f32::NAN;
             }
-        }
-        if frame.values().iter().all(|pixel| pixel.is_nan()) {
-            return Err(CalibrationError::NothingLeft);
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ pub enum CalibrationError {
         "{what} {name} has {width} x {height} pixels: expected {expected_width} x {expected_height}, as {of}"
     )]
     SizesDiffer {
-        /// `the dark`, `the flat`.
+        /// `the dark`, `the flat`, `the mask`.
         what: &'static str,
         /// Its file.
         name: String,

@@ -12,6 +12,7 @@
 //! - Saturated pixels stay saturated: if the division lifts another pixel above full scale, full
 //!   scale is raised.
 //! - The flat is normalized to a mean of 1.
+//! - Pixels that a mask leaves out have no value, either. It is drawn over the picture as it is seen.
 //! - A frame whose `Orientation` turns or mirrors it is calibrated in the rows of its file, and then
 //!   turned back.
 //!

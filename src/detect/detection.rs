@@ -1,5 +1,6 @@
 //! The sources of a frame, as detection reports them.
 
+use super::sky_area::SkyArea;
 use crate::base::coords::PixelPoint;
 use std::cmp::Ordering;
 
@@ -98,9 +99,17 @@ pub struct Detections {
     /// Whether fainter sources were left out, since there are more than
     /// [`DetectConfig::max_detections`](super::DetectConfig::max_detections).
     pub is_truncated: bool,
+    /// The part of the frame that shows the sky; `None` where all of it does, or where it was not looked
+    /// at.
+    pub sky_area: Option<SkyArea>,
 }
 
 impl Detections {
+    /// Whether the sky is seen at a place.
+    pub(crate) fn shows_sky(&self, place: &PixelPoint) -> bool {
+        self.sky_area.as_ref().is_none_or(|area| area.shows(place))
+    }
+
     /// Removes what was found before; the list keeps its memory.
     pub(super) fn clear(&mut self) {
         let mut sources = std::mem::take(&mut self.sources);

@@ -48,6 +48,7 @@ mod pixels;
 mod psf;
 mod psf_fit;
 mod search;
+mod sky_area;
 mod star_model;
 mod threads;
 mod threshold;
@@ -65,6 +66,9 @@ pub use detection::{
 pub use error::DetectError;
 #[doc(hidden)]
 pub use filter_model::FilterModel;
+#[doc(hidden)]
+pub use sky_area::Circle;
+pub use sky_area::SkyArea;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};

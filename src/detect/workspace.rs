@@ -1,10 +1,13 @@
 //! Buffers of detection.
 
 use super::background::FrameBackground;
+use super::config::DetectConfig;
+use super::detection::Detections;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
+use super::sky_area::SkyArea;
 use crate::base::interrupt::Interrupt;
-use crate::frame::{Frame, MemoryLimit, SaturationFinder};
+use crate::frame::{Frame, MemoryLimit, Pixels, SaturationFinder};
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
@@ -70,6 +73,25 @@ impl Workspace {
     /// [`with_memory_limit`](Self::with_memory_limit), from the next frame on.
     pub(crate) fn set_memory(&mut self, memory: MemoryLimit) {
         self.memory = memory;
+    }
+
+    /// The part of the frame that shows the sky; `frame` is the one that was searched last, with these
+    /// options.
+    pub(crate) fn sky_area(
+        &mut self,
+        frame: &Frame,
+        config: &DetectConfig,
+        found: &Detections,
+    ) -> Option<SkyArea> {
+        /// What hides the sky bends the background by this share of its height at least.
+        const MIN_BEND: f32 = 0.1;
+        let has_gaps =
+            || matches!(&frame.pixels, Pixels::F32(values) if values.iter().any(|v| v.is_nan()));
+        if !self.background.mesh.has_edges(MIN_BEND) && !has_gaps() {
+            return None;
+        }
+        let saturation_adu = config.saturation_adu(frame, &mut self.saturation);
+        SkyArea::of_picture(frame, found, saturation_adu)
     }
 
     /// Whether so many bytes fit its memory beside `frame`.

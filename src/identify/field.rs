@@ -1,6 +1,7 @@
 //! The stars observed in one frame: the input of identification.
 
 use crate::base::coords::PixelPoint;
+use crate::detect::SkyArea;
 use crate::sky::places::StarPlaces;
 
 /// Position of a source in the frame's list of sources: its detections, or the lines of a centroid
@@ -71,11 +72,28 @@ pub struct StarField {
     /// Standard deviation of the PSF before pixel integration, in pixels. Without it no catalogue
     /// stars are treated as blended.
     pub spot_sigma_px: Option<f64>,
+    /// The part of the frame that shows the sky; `None` where all of it does.
+    pub sky_area: Option<SkyArea>,
     /// Brightest first.
     pub stars: Vec<ObservedStar>,
 }
 
 impl StarField {
+    /// Whether the sky is seen at a place.
+    pub(super) fn shows_sky(&self, place: &PixelPoint) -> bool {
+        self.sky_area.as_ref().is_none_or(|area| area.shows(place))
+    }
+
+    /// The same frame with these stars, brightest first.
+    pub(super) fn with_stars(&self, stars: Vec<ObservedStar>) -> Self {
+        let sky_area = self.sky_area.clone();
+        Self {
+            stars,
+            sky_area,
+            ..*self
+        }
+    }
+
     /// The `count` brightest stars, or all if there are fewer.
     pub fn brightest(&self, count: usize) -> &[ObservedStar] {
         &self.stars[..count.min(self.stars.len())]
@@ -109,6 +127,7 @@ impl StarField {
             photometry: Photometry::Instrumental,
             places: StarPlaces::default(),
             spot_sigma_px: None,
+            sky_area: None,
             stars: places.iter().enumerate().map(star).collect(),
         }
     }

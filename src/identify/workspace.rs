@@ -65,6 +65,7 @@ pub const NAME_ODDS: f64 = 100.0;
 ///     photometry: Photometry::Instrumental,
 ///     places: StarPlaces::default(),
 ///     spot_sigma_px: Some(detections.spot_sigma_px),
+///     sky_area: None,
 ///     stars: detections.sources.iter().enumerate().map(observed).collect(),
 /// };
 /// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
@@ -426,7 +427,7 @@ impl Brightest {
         let mut stars = self.0.take().map_or_else(Vec::new, |old| old.stars);
         stars.clear();
         stars.extend_from_slice(field.brightest(count));
-        self.0.insert(StarField { stars, ..*field })
+        self.0.insert(field.with_stars(stars))
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) struct FrameStar {
     pub v_mag: f64,
     /// Index of its detection; `None` if it was not detected.
     pub detection: Option<usize>,
-    /// Whether it is single and well inside the frame.
+    /// Whether it is single, well inside the frame, and not hidden.
     pub is_clear: bool,
     /// Light of undetected neighbors in its flux, over its own.
     pub neighbors_light: f64,
@@ -89,7 +89,9 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             star: star.star,
             v_mag: f64::from(star.v_mag),
             detection: detections[index],
-            is_clear: camera.nearly_contains(&star.pixel, -resolved_px) && around.is_single,
+            is_clear: camera.nearly_contains(&star.pixel, -resolved_px)
+                && around.is_single
+                && frame.detections.shows_sky(&star.pixel),
             neighbors_light: around.undetected_light,
         }
     });

@@ -72,6 +72,7 @@ impl NamedFrame<'_> {
         let bright = view.stars_to(self.indexed, BRIGHT_V_MAG);
         let is_missing = |(index, star): &(usize, &PredictedStar)| {
             found.camera.nearly_contains(&star.pixel, -border_px)
+                && self.detections.shows_sky(&star.pixel)
                 && !named.contains(&star.star)
                 && !self.is_in_light_of(&bright[..*index], star)
         };

@@ -133,6 +133,7 @@ impl CentroidList {
             photometry: self.photometry,
             places,
             spot_sigma_px: None,
+            sky_area: None,
             stars: stars.map(observed).collect(),
         }
     }

@@ -51,7 +51,7 @@ pub(super) fn identify_stars(
         found.add_common_error(trails.middle_sigma_px);
     }
     let image = Some((frame, detections));
-    let outcome = identified(found, image, &field, &priors.binding(), context.indexed);
+    let outcome = identified(found, image, &field, priors, context.indexed);
     let outcome = match outcome {
         Outcome::NotIdentified(reason) if may_be_negative(&reason) => {
             let negative = negative(frame, detections, detector);

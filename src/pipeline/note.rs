@@ -9,7 +9,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::camera::KnownLens;
-use crate::detect::{MeasuredPsf, NoiseTail, StarTrails, Wings};
+use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Wings};
 use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
@@ -54,6 +54,8 @@ pub enum Note {
         /// How many were to be.
         wanted: usize,
     },
+    /// The sky of a frame that is not identified fills a circle, as by an all-sky lens.
+    RoundPicture(Circle),
     /// The scale in the header is not that of the frame.
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
@@ -137,6 +139,7 @@ impl Note {
             Self::DefectiveColumns(_) => "defective_columns",
             Self::ColorMosaic(_) => "color_mosaic",
             Self::MoreStars { .. } => "more_stars",
+            Self::RoundPicture(_) => "round_picture",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::OtherLens { .. } => "lens_differs",
@@ -234,6 +237,12 @@ impl Note {
             known_px: lens.central_focal_length_px(),
             found_px: found.camera.central_focal_length_px(),
         })
+    }
+
+    /// That a frame that is not identified looks like that of an all-sky lens.
+    pub(super) fn of_circle(sky: Option<&SkyArea>, outcome: &Outcome) -> Option<Self> {
+        let sky = sky.filter(|_| outcome.identification().is_none())?;
+        sky.circle().map(Self::RoundPicture)
     }
 
     /// What an identified frame without a date lacks.
@@ -371,6 +380,12 @@ impl fmt::Display for Note {
                  frame, and so all were measured"
             ),
             Self::Camera(contradiction) => contradiction.fmt(f),
+            Self::RoundPicture(Circle { centre, radius_px }) => write!(
+                f,
+                "the sky fills a circle of {radius_px:.0} px around ({:.0}, {:.0}): this looks like a fisheye \
+                 lens, whose middle is identified first; stars are needed there",
+                centre.x, centre.y
+            ),
             Self::NotLinear { slope, mean_v_mag } => write!(
                 f,
                 "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",

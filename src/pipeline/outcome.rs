@@ -42,9 +42,7 @@ impl Reason {
                 vec![Remedy::Fov, Remedy::Near]
             }
             Self::Search(SearchFailure::Interrupted) => vec![Remedy::TimeLimit],
-            Self::Diagnosis(Diagnosis::ScaleOutOfRange { .. }) => {
-                vec![Remedy::Fov, Remedy::PixelScale]
-            }
+            Self::Diagnosis(Diagnosis::TooNarrow { .. }) => vec![Remedy::Catalog],
             Self::Diagnosis(Diagnosis::HintsExclude(excluded)) => {
                 let scale = excluded
                     .allowed_fov_x_rad

@@ -136,4 +136,6 @@ pub struct Background {
     pub level_adu: f64,
     /// Standard deviation of one pixel.
     pub noise_adu: f64,
+    /// Share of the frame that shows the sky.
+    pub sky_share: f64,
 }

@@ -11,7 +11,7 @@ use super::stopwatch::Timing;
 use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
-use crate::detect::Detections;
+use crate::detect::{Detections, SkyArea};
 use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
@@ -133,6 +133,11 @@ impl SolvedFrame<'_> {
             background: Some(Background {
                 level_adu: self.detections.background_adu,
                 noise_adu: self.detections.noise_adu,
+                sky_share: self
+                    .detections
+                    .sky_area
+                    .as_ref()
+                    .map_or(1.0, SkyArea::share),
             }),
             observation: self.observation,
             site: self.priors.site,
@@ -163,6 +168,7 @@ impl SolvedFrame<'_> {
             .chain(Note::of_scale(self.dropped_scale, outcome))
             .chain(self.more_stars.map(|wanted| Note::MoreStars { wanted }))
             .chain(Note::of_lens(self.context.lens.as_deref(), outcome))
+            .chain(Note::of_circle(self.detections.sky_area.as_ref(), outcome))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
@@ -219,7 +225,8 @@ impl SolvedFrame<'_> {
         let stars = view.stars_to(indexed, indexed.faintest_v_mag());
         let inside = stars
             .iter()
-            .filter(|star| found.camera.contains(&star.pixel));
+            .filter(|star| found.camera.contains(&star.pixel))
+            .filter(|star| self.detections.shows_sky(&star.pixel));
         let catalog = indexed.catalog();
         let star = |star: &PredictedStar| FieldStar {
             v_mag: f64::from(star.v_mag),

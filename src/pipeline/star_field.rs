@@ -38,6 +38,7 @@ pub(super) fn field_of(
         photometry: Photometry::Instrumental,
         places,
         spot_sigma_px: Some(detections.spot_sigma_px),
+        sky_area: detections.sky_area.clone(),
         stars: stars.collect(),
     }
 }

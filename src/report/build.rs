@@ -2,7 +2,7 @@
 
 use super::digits::{
     AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, HORIZON_DECIMALS, MAG_DECIMALS,
-    PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
+    PIXEL_DECIMALS, SHARE_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
 };
 use super::frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport,
@@ -142,6 +142,7 @@ fn calibration(applied: &Applied) -> CalibrationReport {
         dark: applied.dark.clone(),
         flat: applied.flat.clone(),
         hot_pixels: applied.hot_pixels.clone(),
+        mask: applied.mask.clone(),
     }
 }
 
@@ -298,6 +299,7 @@ fn background(measured: Option<&Background>) -> BackgroundReport {
     BackgroundReport {
         level: measured.and_then(|sky| significant(sky.level_adu, FLUX_DIGITS)),
         noise: measured.and_then(|sky| significant(sky.noise_adu, FLUX_DIGITS)),
+        sky_share: measured.map(|sky| to_decimals(sky.sky_share, SHARE_DECIMALS)),
     }
 }
 

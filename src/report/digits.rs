@@ -18,3 +18,5 @@ pub(super) const FLUX_DIGITS: i32 = 6;
 pub(super) const CHANCE_DIGITS: i32 = 2;
 /// Significant digits of a standard error.
 pub(super) const SIGMA_DIGITS: i32 = 4;
+/// Decimals of a share of the frame.
+pub(super) const SHARE_DECIMALS: i32 = 4;

@@ -87,6 +87,8 @@ pub struct CalibrationReport {
     pub flat: Option<String>,
     /// The list of hot pixels, which were masked.
     pub hot_pixels: Option<String>,
+    /// The mask.
+    pub mask: Option<String>,
 }
 
 /// The date of a frame.
@@ -371,6 +373,9 @@ pub struct BackgroundReport {
     pub level: Option<f64>,
     /// Noise of one pixel (standard deviation).
     pub noise: Option<f64>,
+    /// Share of the frame that shows the sky: the rest is masked, or the picture itself shows that something
+    /// is in front of the sky there.
+    pub sky_share: Option<f64>,
 }
 
 /// The Moon or a planet in the frame.
@@ -432,6 +437,9 @@ pub struct StarReport {
     pub ra_deg: Option<f64>,
     /// Declination of the same, in degrees.
     pub dec_deg: Option<f64>,
+    /// Airmass of its light, where site and time of day are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub airmass: Option<f64>,
     /// Distance of the detection from the star's own predicted position, in pixels.
     pub residual_px: Option<f64>,
     /// Distance of the detection from the light of the star and all those blended with it, in

@@ -3,7 +3,7 @@
 use crate::base::format::decimals_for;
 use crate::base::units::DEG_PER_RAD;
 use crate::identify::diagnosis::{Diagnosis, Excluded};
-use crate::identify::{LOG10_FALSE_ALARM_LIMIT, SearchFailure};
+use crate::identify::{LOG10_FALSE_ALARM_LIMIT, ScaleSource, SearchFailure};
 use crate::pipeline::{Reason, Solution};
 
 /// `reason` as text.
@@ -58,17 +58,27 @@ fn cause_text(cause: &Diagnosis) -> String {
         Diagnosis::DoubleExposure(double) => format!(
             "the same stars are there twice, as in a double exposure: {double}; expose once"
         ),
-        Diagnosis::ScaleOutOfRange {
+        Diagnosis::TooNarrow {
             fov_x_rad,
-            searched_rad,
-        } => format!(
-            "the field of view that was given, {} wide, is outside what can be \
-             identified with this catalogue: {}",
-            range(*fov_x_rad),
-            range(*searched_rad),
-        ),
+            source,
+            narrowest_rad,
+        } => too_narrow(*fov_x_rad, *source, *narrowest_rad),
         Diagnosis::HintsExclude(excluded) => excluded_text(excluded),
     }
+}
+
+fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> String {
+    let stated = match source {
+        ScaleSource::User => "that was given",
+        ScaleSource::Camera => "by the description of the camera",
+        ScaleSource::Header => "by the file's header",
+    };
+    format!(
+        "the field of view {stated}, {} wide, is too narrow for the stars of this catalogue, which identify \
+         fields from {} on; one with fainter stars is needed",
+        range(fov_x_rad),
+        degrees(narrowest_rad),
+    )
 }
 
 fn too_few(found: usize, needed: usize, solution: &Solution) -> String {

@@ -36,6 +36,7 @@ impl StarRow {
             star.vmag, "mag", "phot.mag;em.opt.V", "Johnson V of the named star";
             star.ra_deg, "deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)";
             star.dec_deg, "deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)";
+            star.airmass, "", "obs.airMass", "airmass, where site and time are known";
             star.residual_px, "pix", "stat.fit.residual", "distance from the named star";
             star.residual_blend_px, "pix", "stat.fit.residual", "distance from the light of the named star and those blended with it";
             star.p_chance, "", "stat.probability", "probability that the name is chance";
@@ -100,6 +101,7 @@ mod tests {
             vmag: Some(-1.44),
             ra_deg: Some(101.287),
             dec_deg: Some(-16.716),
+            airmass: Some(1.52),
             residual_px: Some(0.01),
             residual_blend_px: Some(0.02),
             p_chance: Some(1.2e-9),

@@ -1,6 +1,8 @@
 //! The reports of detections and their stars.
 
-use super::digits::{CHANCE_DIGITS, DIRECTION_DECIMALS, FLUX_DIGITS, PIXEL_DECIMALS, SIGMA_DIGITS};
+use super::digits::{
+    AIRMASS_DECIMALS, CHANCE_DIGITS, DIRECTION_DECIMALS, FLUX_DIGITS, PIXEL_DECIMALS, SIGMA_DIGITS,
+};
 use super::frame_report::StarReport;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::format::{finite, significant, to_decimals, turn_deg};
@@ -49,7 +51,11 @@ impl ReportedPointing<'_> {
             let pixel = PixelPoint::new(star.x, star.y);
             if let Some(direction) = self.identification.camera.direction_of(&pixel) {
                 let apparent = to_icrs.apply(&direction);
-                star.set_direction(&self.identification.places.astrometric(&apparent));
+                let places = &self.identification.places;
+                star.set_direction(&places.astrometric(&apparent));
+                star.airmass = places
+                    .airmass(&apparent)
+                    .map(|airmass| to_decimals(airmass, AIRMASS_DECIMALS));
             }
         }
         for star_match in &self.identification.matches {

@@ -53,6 +53,7 @@ impl FrameReport {
         lines.extend(self.calibration.iter().map(calibration_line));
         lines.extend(self.notes.iter().map(|note| labelled("note", &note.text)));
         lines.extend(self.background_line());
+        lines.extend(self.sky_line());
         lines.push(self.timing_line());
         lines.extend(self.star_lines(options));
         lines.iter().map(|line| printable(line) + "\n").collect()
@@ -109,6 +110,16 @@ impl FrameReport {
         let decimals = decimals_for(noise, 6);
         let text = format!("{level:.decimals$}, noise {noise:.decimals$} in one pixel");
         Some(labelled("background", &text))
+    }
+
+    /// What is in front of the sky, where that is more than a hundredth of the frame.
+    fn sky_line(&self) -> Option<String> {
+        let share = self.background.sky_share.filter(|share| *share < 0.99)?;
+        let text = format!(
+            "{:.0} % of the frame; something is in front of the rest, or it is masked",
+            100.0 * share
+        );
+        Some(labelled("sky", &text))
     }
 
     fn timing_line(&self) -> String {
@@ -332,6 +343,7 @@ fn calibration_line(applied: &CalibrationReport) -> String {
         ("dark", &applied.dark),
         ("flat", &applied.flat),
         ("hot pixels", &applied.hot_pixels),
+        ("mask", &applied.mask),
     ];
     let applied = parts.into_iter().filter_map(|(kind, file)| {
         let file = file.as_ref()?;

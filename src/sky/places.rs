@@ -13,9 +13,11 @@
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::sky::catalog::Star;
+use crate::sky::observer::airmass::airmass_kasten_young;
 use crate::sky::observer::{Air, Site, earth_velocity_c};
 use nalgebra::Vector3;
 use serde::Serialize;
+use std::f64::consts::FRAC_PI_2;
 
 /// Speed of light in kilometres per second.
 const LIGHT_KM_S: f64 = 299_792.458;
@@ -151,6 +153,13 @@ impl StarPlaces {
     pub fn is_below_horizon(&self, apparent: &UnitVector<Icrs>) -> bool {
         self.zenith()
             .is_some_and(|zenith| zenith.dot(apparent) < 0.0)
+    }
+
+    /// The airmass that light from an apparent direction passes, where the zenith is known and it comes from
+    /// above the horizon.
+    pub fn airmass(&self, apparent: &UnitVector<Icrs>) -> Option<f64> {
+        let zenith_distance_rad = self.zenith()?.angle_to(apparent);
+        (zenith_distance_rad < FRAC_PI_2).then(|| airmass_kasten_young(zenith_distance_rad))
     }
 
     /// Where a star appears.

@@ -125,17 +125,19 @@ fn a_negative_is_named_and_says_what_to_do() {
 }
 
 #[test]
-fn a_scale_outside_the_range_says_the_range() {
+fn a_field_too_narrow_for_the_catalog_says_so() {
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     for (x, y, flux) in random_dots(1, 40) {
         canvas.spot(x, y, flux);
     }
     let picture = canvas.develop(3);
-    let range = "1.50° to 80.0°";
-    for options in [["--fov", "0.5"], ["--fov", "130"], ["--pixel-scale", "2"]] {
-        check(&picture, &options, "scale_out_of_range", &[range]);
+    for options in [["--fov", "0.5"], ["--pixel-scale", "2"]] {
+        let expected = ["that was given", "from 1.50° on", "--catalog"];
+        check(&picture, &options, "too_narrow", &expected);
     }
-    check(&picture, &["--fov", "20"], "no_match", &["40 detections"]);
+    for fov in ["20", "130"] {
+        check(&picture, &["--fov", fov], "no_match", &["40 detections"]);
+    }
 }
 
 #[test]

@@ -132,6 +132,7 @@ fn field(mut stars: Vec<ObservedStar>) -> StarField {
         photometry: Photometry::Instrumental,
         places: StarPlaces::default(),
         spot_sigma_px: None,
+        sky_area: None,
         stars,
     }
 }

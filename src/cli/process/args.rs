@@ -65,6 +65,10 @@ pub(crate) struct CalibrationOptions {
     /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
     #[arg(long, value_name = "FILE.csv")]
     pub(super) hot_pixels: Option<PathBuf>,
+    /// Image of the frame's size that is black where the frame does not show the sky: trees, houses,
+    /// lamps
+    #[arg(long, value_name = "FILE")]
+    pub(super) mask: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -169,7 +173,8 @@ impl CalibrationOptions {
         &self,
         camera: Option<&CameraDescription>,
     ) -> anyhow::Result<Option<Calibration>> {
-        if self.dark.is_none() && self.flat.is_none() && self.hot_pixels.is_none() {
+        let files = [&self.dark, &self.flat, &self.hot_pixels, &self.mask];
+        if files.into_iter().all(Option::is_none) {
             return Ok(None);
         }
         let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
@@ -182,7 +187,7 @@ impl CalibrationOptions {
             list.context("reading the hot pixels")?,
             bias_adu,
         );
-        Ok(Some(calibration?))
+        Ok(Some(calibration?.with_mask(master(&self.mask)?)))
     }
 }
 

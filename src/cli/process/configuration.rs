@@ -18,6 +18,7 @@ pub(super) fn configuration(
         dark,
         flat,
         hot_pixels,
+        mask,
     } = &arguments.calibration;
     Ok(Configuration {
         catalog: catalog.into(),
@@ -26,6 +27,7 @@ pub(super) fn configuration(
         dark: hash_of(dark)?,
         flat: hash_of(flat)?,
         hot_pixels: hash_of(hot_pixels)?,
+        mask: hash_of(mask)?,
         page: arguments.page.and_then(text_of),
     })
 }

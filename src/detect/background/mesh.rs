@@ -152,6 +152,29 @@ impl Mesh {
         self.set_pieces();
     }
 
+    /// Whether the background has an edge somewhere: a place where it bends by at least a `share` of how
+    /// far it lies above the darkest one, and by the noise of a pixel.
+    pub fn has_edges(&self, share: f32) -> bool {
+        let CellGrid { columns, rows, .. } = self.grid;
+        let darkest = self
+            .background
+            .iter()
+            .copied()
+            .fold(f32::INFINITY, f32::min);
+        let is_edge = |cell: usize, step: usize| {
+            let around = [cell - step, cell, cell + step].map(|at| self.background[at]);
+            let bend = (around[0] - 2.0 * around[1] + around[2]).abs();
+            let brightest = around.into_iter().fold(f32::NEG_INFINITY, f32::max);
+            bend >= (share * (brightest - darkest)).max(self.sigma[cell])
+        };
+        let mut inner = (0..rows).flat_map(|y| (0..columns).map(move |x| [x, y]));
+        inner.any(|[x, y]| {
+            let cell = y * columns + x;
+            let across = (1..columns.saturating_sub(1)).contains(&x) && is_edge(cell, 1);
+            across || (1..rows.saturating_sub(1)).contains(&y) && is_edge(cell, columns)
+        })
+    }
+
     /// The column of pixels at the centre of a column of cells.
     fn center(&self, column: usize) -> f32 {
         (column as f32 + 0.5) * self.cell_width_px - 0.5

@@ -1,6 +1,7 @@
 //! The causes that diagnosis can name.
 
 use crate::base::coords::{Icrs, UnitVector};
+use crate::identify::priors::ScaleSource;
 use std::fmt;
 
 /// Why a frame was not identified, in terms that a person can act on.
@@ -38,12 +39,14 @@ pub enum Diagnosis {
     },
     /// The same pattern of stars occurs twice.
     DoubleExposure(DoubleImage),
-    /// The stated scale is outside the range that can be identified.
-    ScaleOutOfRange {
+    /// The stated field of view is too narrow for the stars of the catalogue.
+    TooNarrow {
         /// Stated horizontal field of view, from and to, in radians.
         fov_x_rad: [f64; 2],
-        /// Horizontal fields of view that the catalogue allows, in radians.
-        searched_rad: [f64; 2],
+        /// Who states it.
+        source: ScaleSource,
+        /// The narrowest horizontal field of view that the catalogue allows, in radians.
+        narrowest_rad: f64,
     },
     /// Without the priors the stars are identified.
     HintsExclude(Box<Excluded>),
@@ -95,7 +98,7 @@ impl Diagnosis {
             Self::Negative { .. } => "negative",
             Self::Trails { .. } => "trails",
             Self::DoubleExposure(_) => "double_exposure",
-            Self::ScaleOutOfRange { .. } => "scale_out_of_range",
+            Self::TooNarrow { .. } => "too_narrow",
             Self::HintsExclude(_) => "hints_exclude",
         }
     }

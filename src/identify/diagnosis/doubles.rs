@@ -153,6 +153,7 @@ mod tests {
             photometry: Photometry::Instrumental,
             places: StarPlaces::default(),
             spot_sigma_px: None,
+            sky_area: None,
             stars,
         }
     }

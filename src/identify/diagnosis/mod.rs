@@ -6,7 +6,7 @@
 //!
 //! 1. The frame is empty (one value everywhere), or a large fraction of it is at full scale.
 //! 2. The priors exclude the solution: the stars are identified without them.
-//! 3. The stated scale is outside the range that can be identified.
+//! 3. The stated field of view is too narrow for the catalogue.
 //! 4. Most of the sources are trails in one direction.
 //! 5. The same pattern of stars occurs twice.
 //!
@@ -56,30 +56,30 @@ pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> 
     image
         .and_then(|(frame, _)| levels::diagnose(frame))
         .or_else(|| has_stars.then(|| excluded(case, sky)).flatten())
-        .or_else(|| out_of_range(case, sky))
+        .or_else(|| too_narrow(case, sky))
         .or_else(|| image.and_then(|(frame, detections)| trails::diagnose(frame, detections)))
         .or_else(|| doubles::find(case.field).map(Diagnosis::DoubleExposure))
 }
 
 /// Searches again without the priors.
 fn excluded(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
-    if !case.priors.restrict_search() {
+    let priors = case.priors.binding();
+    if !priors.restrict_search() {
         return None;
     }
     let found = identify(case.field, &Priors::default(), sky).ok()?;
     Some(Diagnosis::HintsExclude(Box::new(contradiction(
-        case, &found,
+        case, &priors, &found,
     ))))
 }
 
-fn contradiction(case: &Unidentified, found: &Identification) -> Excluded {
+fn contradiction(case: &Unidentified, priors: &Priors, found: &Identification) -> Excluded {
     let (boresight, _) = found.icrs_to_camera.boresight_and_up();
     let pixel_rad = 1.0 / found.camera.focal_length_px();
     let width_px = case.field.width_px;
-    let allowed = case.priors.pixel_scale_range_rad(width_px);
+    let allowed = priors.pixel_scale_range_rad(width_px);
     let excluding = allowed.filter(|[low, high]| !(*low..=*high).contains(&pixel_rad));
-    let distance = case
-        .priors
+    let distance = priors
         .near
         .map(|near| (boresight.angle_to(&near.centre), near.radius_rad));
     Excluded {
@@ -99,14 +99,15 @@ fn fields_of_view(pixel_scales_rad: [f64; 2], width_px: f64) -> [f64; 2] {
     pixel_scales_rad.map(|pixel_rad| 2.0 * (width_px * pixel_rad / 2.0).atan())
 }
 
-fn out_of_range(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
+fn too_narrow(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
     let width_px = case.field.width_px;
-    let scale = case.priors.pixel_scale_range_rad(width_px)?;
-    let searched_rad = sky.fov_range_rad();
-    let pixel_rad = |fov_rad: f64| 1.0 / focal_length_px(width_px, fov_rad);
-    let [narrowest, widest] = searched_rad.map(pixel_rad);
-    (scale[1] < narrowest || scale[0] > widest).then(|| Diagnosis::ScaleOutOfRange {
+    let stated = case.priors.scale?;
+    let scale = stated.pixel_scale_range_rad(width_px);
+    let [narrowest_rad, _] = sky.fov_range_rad();
+    let narrowest_pixel_rad = 1.0 / focal_length_px(width_px, narrowest_rad);
+    (scale[1] < narrowest_pixel_rad).then(|| Diagnosis::TooNarrow {
         fov_x_rad: fields_of_view(scale, width_px),
-        searched_rad,
+        source: stated.source,
+        narrowest_rad,
     })
 }

@@ -38,7 +38,7 @@ impl Thinning {
         }));
         let brightest = field.brightest(LOOKED_AT);
         let is_other = !stars.starts_with(brightest);
-        let thinned = self.field.insert(StarField { stars, ..*field });
+        let thinned = self.field.insert(field.with_stars(stars));
         is_other.then_some(thinned)
     }
 }

@@ -46,7 +46,7 @@ impl Tiers {
             stars.clear();
             stars.extend(field.stars[brighter..].iter().take(TESTED_STARS));
             let tier = Tier {
-                field: StarField { stars, ..*field },
+                field: field.with_stars(stars),
                 brighter,
             };
             match self.0.get_mut(count) {

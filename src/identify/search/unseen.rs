@@ -55,7 +55,7 @@ impl Unseen {
         };
         let in_frame = predicted
             .iter()
-            .filter(|star| hypothesis.camera.contains(&star.pixel));
+            .filter(|star| hypothesis.camera.contains(&star.pixel) && field.shows_sky(&star.pixel));
         let bright = in_frame
             .take(BRIGHTEST)
             .take_while(|star| star.v_mag <= *faintest);

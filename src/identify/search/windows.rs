@@ -93,6 +93,7 @@ impl Windows {
                     width_px: side_px,
                     height_px: side_px,
                     stars,
+                    sky_area: None,
                     ..*field
                 },
                 corner,

@@ -49,6 +49,7 @@ fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
         background: Some(Background {
             level_adu: 55.0,
             noise_adu: 2.9,
+            sky_share: 1.0,
         }),
         ..sample::solution(width, height, outcome)
     }

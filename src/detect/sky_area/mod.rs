@@ -1,0 +1,130 @@
+//! The part of a frame that shows the sky, without trees, houses, lamps, the Moon, and the border around
+//! the circle of an all-sky lens.
+
+mod circle;
+mod levels;
+mod regions;
+
+use super::detection::Detections;
+use crate::base::coords::PixelPoint;
+use crate::frame::Frame;
+pub use circle::Circle;
+use levels::Levels;
+use std::sync::Arc;
+
+/// The part of a frame that shows the sky, in cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkyArea {
+    cell_px: usize,
+    columns: usize,
+    /// Whether each cell is hidden, row by row.
+    hidden: Arc<[bool]>,
+}
+
+impl SkyArea {
+    /// What a picture itself tells: an area with a sharp edge that is darker than what is around it and has
+    /// few stars, and what is saturated or has no value, do not show the sky. `None` where all does.
+    pub(super) fn of_picture(
+        frame: &Frame,
+        detections: &Detections,
+        saturation_adu: f32,
+    ) -> Option<Self> {
+        let levels = Levels::of(frame, saturation_adu);
+        let stars = levels.count(detections);
+        let hidden = regions::hidden(&levels, &stars);
+        hidden.contains(&true).then(|| Self {
+            cell_px: levels.cell_px,
+            columns: levels.columns,
+            hidden: hidden.into(),
+        })
+    }
+
+    /// Whether the sky is seen at a place.
+    pub fn shows(&self, place: &PixelPoint) -> bool {
+        let rows = self.hidden.len() / self.columns;
+        let cell =
+            |at: f64, cells: usize| ((at + 0.5).max(0.0) as usize / self.cell_px).min(cells - 1);
+        !self.hidden[cell(place.y, rows) * self.columns + cell(place.x, self.columns)]
+    }
+
+    /// The share of the frame that shows the sky.
+    pub fn share(&self) -> f64 {
+        let seen = self.hidden.iter().filter(|hidden| !**hidden).count();
+        seen as f64 / self.hidden.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::{DetectConfig, Workspace, detect};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const WIDTH: usize = 640;
+    const HEIGHT: usize = 480;
+
+    /// The sky area of a frame with this background and 300 stars where `has_stars`.
+    fn area(
+        level: impl Fn(f64, f64) -> f64,
+        has_stars: impl Fn(f64, f64) -> bool,
+    ) -> Option<SkyArea> {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let mut noise = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let pixel = |index| level((index % WIDTH) as f64, (index / WIDTH) as f64) + 2.0 * noise();
+        let mut pixels: Vec<f32> = (0..WIDTH * HEIGHT)
+            .map(|index| pixel(index) as f32)
+            .collect();
+        let mut random = ChaCha8Rng::seed_from_u64(2);
+        for _ in 0..300 {
+            let (x, y) = (
+                random.random_range(5..WIDTH - 5),
+                random.random_range(5..HEIGHT - 5),
+            );
+            if has_stars(x as f64, y as f64) {
+                for (dx, dy, light) in [(0, 0, 80.0), (1, 0, 50.0), (0, 1, 50.0), (1, 1, 30.0)] {
+                    pixels[(y + dy) * WIDTH + x + dx] += light;
+                }
+            }
+        }
+        let frame = Frame::new(WIDTH, HEIGHT, pixels).unwrap();
+        let frame = frame.with_levels(1.0, Some(255.0));
+        let (config, mut workspace) = (DetectConfig::default(), Workspace::new());
+        let found = detect(&frame, &config, &mut workspace).unwrap();
+        workspace.sky_area(&frame, &config, &found)
+    }
+
+    #[test]
+    fn trees_hide_the_sky() {
+        let is_tree = |x: f64, y: f64| y > 330.0 + 40.0 * (x / 40.0).sin();
+        let level = |x, y| if is_tree(x, y) { 25.0 } else { 80.0 };
+        let found = area(level, |x, y| !is_tree(x, y)).unwrap();
+        let shows = |x, y| found.shows(&PixelPoint::new(x, y));
+        assert!(shows(300.0, 100.0) && shows(0.0, 0.0) && shows(639.0, 250.0));
+        assert!(!shows(300.0, 420.0) && !shows(0.0, 479.0) && !shows(639.0, 479.0));
+        assert!(
+            (found.share() - 330.0 / 480.0).abs() < 0.03,
+            "{}",
+            found.share()
+        );
+    }
+
+    #[test]
+    fn a_dark_area_with_stars_and_a_gradient_are_sky() {
+        let dark = |_: f64, y: f64| if y > 330.0 { 25.0 } else { 80.0 };
+        assert_eq!(area(dark, |_, _| true).map(|area| area.share()), None);
+        let corners =
+            |x: f64, y: f64| 100.0 - 80.0 * ((x - 320.0).hypot(y - 240.0) / 400.0).powi(2);
+        assert_eq!(area(corners, |_, _| true), None);
+    }
+
+    #[test]
+    fn a_lamp_hides_the_sky_around_it() {
+        let lamp = |x: f64, y: f64| 60.0 + 3e5 / (1.0 + (x - 200.0).powi(2) + (y - 200.0).powi(2));
+        let level = |x: f64, y: f64| lamp(x, y).min(255.0);
+        let found = area(level, |_, _| true).unwrap();
+        assert!(!found.shows(&PixelPoint::new(200.0, 200.0)));
+        assert!(found.shows(&PixelPoint::new(500.0, 400.0)));
+        assert!(found.share() > 0.95);
+    }
+}
