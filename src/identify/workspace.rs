@@ -270,7 +270,7 @@ impl Others {
         });
         let of_whole = coarser.map(move |_| Choice::new(whole, SearchPlan::votes(effort)));
         let windows = self.windows.of(whole.field).iter().map(move |window| {
-            let plan = if window.is_central {
+            let plan = if window.is_main {
                 SearchPlan::coarse(effort)
             } else {
                 SearchPlan::window(effort)

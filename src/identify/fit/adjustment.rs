@@ -48,6 +48,9 @@ const MAX_STEP: f64 = 0.5;
 /// What lenses are like: standard deviation of the terms about zero, in units of half the frame's
 /// diagonal. It only matters where the stars say nothing of a term, as of the axis of a narrow field.
 const USUAL_TERMS: [f64; LENS_TERMS] = [0.5, 0.5, 0.5, 3.0, 3.0, 0.05, 0.05, 0.1, 0.02];
+/// The same of the radial terms and the decentring of a lens that is followed from a window: what any ideal
+/// projection needs beyond the equidistant one.
+const FOLLOWED_TERMS: [f64; LENS_TERMS] = [0.5, 0.2, 0.1, 3.0, 3.0, 0.005, 0.005, 0.1, 0.02];
 /// The same of the axis where a lens is no pinhole: frames of these are not cut.
 const USUAL_AXIS_OF_FISHEYE: f64 = 0.1;
 /// The term that shifts the axis along x; the next does along y.
@@ -75,7 +78,9 @@ pub(super) struct Adjustment<'a, const P: usize> {
 pub(super) enum Prior<'a> {
     /// What lenses are like.
     Usual,
-    /// The same, and where the axis meets the frame.
+    /// What lenses are like that are followed from a window.
+    Followed,
+    /// What lenses are like, and where the axis meets the frame.
     Axis([f64; 2]),
     /// A lens that was measured, with this information (inverse covariance) on ln f and the terms.
     Known(&'a CameraModel, &'a DMatrix<f64>),
@@ -283,6 +288,14 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         self
     }
 
+    /// The same of a lens that is followed from a window.
+    pub fn followed(self) -> Self {
+        Self {
+            prior: Prior::Followed,
+            ..self
+        }
+    }
+
     /// The same with a lens that was measured before.
     pub fn with_known_lens(mut self, lens: &'a CameraModel, information: &'a DMatrix<f64>) -> Self {
         self.prior = Prior::Known(lens, information);
@@ -358,7 +371,9 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             Prior::Known(lens, information) => {
                 self.add_known(lens, information, &mut block, &mut vector)
             }
-            Prior::Usual | Prior::Axis(_) => self.add_usual(&mut block, &mut vector),
+            Prior::Usual | Prior::Followed | Prior::Axis(_) => {
+                self.add_usual(&mut block, &mut vector)
+            }
         };
         Some(Normal {
             root: block.cholesky()?,
@@ -376,7 +391,10 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         let terms_px = &self.predictor.distortion.coefficients_px()[..P - POSE_PARAMETERS];
         let mut misfit = 0.0;
         for (term, known_px) in terms_px.iter().enumerate() {
-            let (expected_px, sigma_px) = usual_term_px(&self.predictor.camera, axis_px, term);
+            let (expected_px, mut sigma_px) = usual_term_px(&self.predictor.camera, axis_px, term);
+            if matches!(self.prior, Prior::Followed) && !(AXIS..AXIS + 2).contains(&term) {
+                sigma_px = FOLLOWED_TERMS[term] * self.predictor.camera.radius_px();
+            }
             let parameter = POSE_PARAMETERS + term;
             block[(parameter, parameter)] += sigma_px.powi(-2);
             vector[parameter] += expected_px * sigma_px.powi(-2);

@@ -1,11 +1,11 @@
 //! A lens that is known in a part of the frame is followed outwards, over all of it.
 //!
-//! named stars of a window → fit of a lens → stars whose places it predicts well → fit → … as far as
-//! there are stars
+//! named stars of a window → fit of a lens → stars a step farther out → fit → … as far as there are
+//! stars
 //!
 //! The parameters of the lens have errors, so the error of each predicted place is known. Only stars
-//! that are predicted so well that chance seldom puts a detection there are paired. Each fit brings
-//! more of them into reach.
+//! that are predicted so well that chance seldom puts a detection there are paired, and only a step
+//! beyond those that agree: a lens that is wrong out there finds chance pairs and follows them.
 
 use super::adjustment::{
     Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor, robust_sigma_px,
@@ -38,6 +38,12 @@ const MIN_RADIUS_PX: f64 = 1.5;
 const MAX_RADIUS_SHARE: f64 = 0.005;
 /// Smallest error of a star's place, in pixels, while the lens is not known well.
 const MIN_SIGMA_PX: f64 = 0.3;
+/// How far beyond the stars that agree others are looked for, in radians.
+const STEP_RAD: f64 = 6.0 * RAD_PER_DEG;
+/// Rounds without a step outwards after which there is none.
+const MAX_STALLED: usize = 3;
+/// Fits of the stars of the window in which outliers lose weight.
+const ROBUST_ROUNDS: usize = 3;
 /// Maximum rounds of pairing and fitting.
 const MAX_ROUNDS: usize = 40;
 /// A fit ends where a step moves the predicted places by less than this, in standard errors.
@@ -72,10 +78,19 @@ pub struct Growth {
 #[derive(Debug, Clone, Copy)]
 struct ExpectedStar {
     /// Its angle from the axis, in radians.
-    angle_rad: f64,
+    from_axis_rad: f64,
+    /// Its angle from the centre of the window, in radians.
+    from_window_rad: f64,
     /// Probability that a detection is there by chance.
     chance: f64,
     is_found: bool,
+}
+
+/// The part of the sky in which stars are paired.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    centre: UnitVector<Icrs>,
+    radius_rad: f64,
 }
 
 /// A lens, its attitude, and the covariance of all parameters.
@@ -97,20 +112,35 @@ impl Growth {
         self.stars.extend_from_slice(seed.stars);
         let (camera, icrs_to_camera) = start(problem, seed);
         let mut fitted = fit(&self.stars, &camera, &icrs_to_camera)?;
+        for _ in 0..ROBUST_ROUNDS {
+            for (star, of_seed) in self.stars.iter_mut().zip(seed.stars) {
+                let seen = fitted.icrs_to_camera.apply(&star.icrs);
+                let residual_px = fitted.camera.pixel_of(&seen)?.distance_to(&star.pixel);
+                star.sigma_px = robust_sigma_px(of_seed.sigma_px, residual_px);
+            }
+            fitted = fit(&self.stars, &fitted.camera, &fitted.icrs_to_camera)?;
+        }
         let mut zero_point_mag = seed.hypothesis.zero_point_mag;
-        let mut reached = 0;
+        let mut reach = reach_of(seed);
+        let mut stalled = 0;
         for _ in 0..MAX_ROUNDS {
-            zero_point_mag = self.pair(problem, &fitted, zero_point_mag);
+            zero_point_mag = self.pair(problem, &fitted, &reach, zero_point_mag);
             let Some(next) = fit(&self.stars, &fitted.camera, &fitted.icrs_to_camera) else {
                 break;
             };
             fitted = next;
-            if self.expected.len() <= reached {
-                break;
+            let known_rad = self.known_to_rad(|star| star.from_window_rad)?;
+            if known_rad + STEP_RAD > reach.radius_rad {
+                reach.radius_rad = known_rad + STEP_RAD;
+                stalled = 0;
+            } else {
+                stalled += 1;
+                if stalled == MAX_STALLED {
+                    break;
+                }
             }
-            reached = self.expected.len();
         }
-        let to_rad = self.known_to_rad()?;
+        let to_rad = self.known_to_rad(|star| star.from_axis_rad)?;
         Some(Hypothesis {
             camera: fitted.camera.limited_to(to_rad),
             icrs_to_camera: fitted.icrs_to_camera,
@@ -122,7 +152,13 @@ impl Growth {
 
     /// Pairs the stars that are predicted well with detections; returns the zero point of the
     /// magnitudes.
-    fn pair(&mut self, problem: Problem, fitted: &Fitted, zero_point_mag: f64) -> f64 {
+    fn pair(
+        &mut self,
+        problem: Problem,
+        fitted: &Fitted,
+        reach: &Reach,
+        zero_point_mag: f64,
+    ) -> f64 {
         let field = problem.field;
         let hypothesis = Hypothesis {
             camera: fitted.camera,
@@ -143,6 +179,10 @@ impl Growth {
         self.expected.clear();
         self.differences_mag.clear();
         for star in self.predicted.iter().take(MAX_PREDICTED) {
+            let from_window_rad = star.direction.angle_to(&reach.centre);
+            if from_window_rad > reach.radius_rad {
+                continue;
+            }
             let direction = fitted.icrs_to_camera.apply(&star.direction);
             let Some(sigma_px) = predictor
                 .predict(&star.direction)
@@ -157,7 +197,8 @@ impl Growth {
             }
             let found = self.nearest(problem, &hypothesis, star, radius_px);
             self.expected.push(ExpectedStar {
-                angle_rad: direction.angle_to(&UnitVector::BORESIGHT),
+                from_axis_rad: direction.angle_to(&UnitVector::BORESIGHT),
+                from_window_rad,
                 chance,
                 is_found: found.is_some(),
             });
@@ -205,11 +246,11 @@ impl Growth {
         best
     }
 
-    /// The angle from the axis up to which more stars agree than by chance.
-    fn known_to_rad(&self) -> Option<f64> {
-        let rings = (MAX_ANGLE_RAD / RING_RAD).ceil() as usize;
+    /// The angle, of these of the stars, up to which more of them agree than by chance.
+    fn known_to_rad(&self, angle_rad: impl Fn(&ExpectedStar) -> f64) -> Option<f64> {
+        let rings = (PI / RING_RAD).ceil() as usize;
         let is_known = |ring: usize| {
-            let within = |star: &&ExpectedStar| (star.angle_rad / RING_RAD) as usize == ring;
+            let within = |star: &&ExpectedStar| (angle_rad(star) / RING_RAD) as usize == ring;
             let of_ring = self.expected.iter().filter(within);
             let (mut stars, mut found, mut chance) = (0, 0, 0.0);
             for star in of_ring {
@@ -222,9 +263,7 @@ impl Growth {
         let outermost = (0..rings).rev().find(|ring| is_known(*ring))?;
         let edge_rad = (outermost + 1) as f64 * RING_RAD;
         let inside = self.expected.iter().filter(|star| star.is_found);
-        let inside = inside
-            .map(|star| star.angle_rad)
-            .filter(|angle| *angle < edge_rad);
+        let inside = inside.map(&angle_rad).filter(|angle| *angle < edge_rad);
         Some(inside.fold(0.0, f64::max) + 0.1 * RING_RAD)
     }
 }
@@ -241,6 +280,16 @@ impl Fitted {
             by.dot(&(self.covariance * by))
         };
         variance(0).max(variance(1)).max(0.0).sqrt()
+    }
+}
+
+/// The window, and a step around it.
+fn reach_of(seed: &Seed) -> Reach {
+    let centre = seed.hypothesis.icrs_to_camera.boresight();
+    let angles = seed.stars.iter().map(|star| star.icrs.angle_to(&centre));
+    Reach {
+        centre,
+        radius_rad: angles.fold(0.0, f64::max) + STEP_RAD,
     }
 }
 
@@ -286,7 +335,8 @@ fn fit(
     if stars.len() < MIN_STARS {
         return None;
     }
-    let mut adjustment = Adjustment::<PARAMETERS>::new(stars, camera, icrs_to_camera, Some(MODEL));
+    let adjustment = Adjustment::<PARAMETERS>::new(stars, camera, icrs_to_camera, Some(MODEL));
+    let mut adjustment = adjustment.followed();
     let normal = adjustment.converge(CONVERGED)?;
     Some(Fitted {
         camera: *adjustment.camera(),

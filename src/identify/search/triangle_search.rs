@@ -192,8 +192,24 @@ impl<'a> Search<'a> {
     }
 
     /// A hypothesis that was not found by a triangle, fitted to the stars of the field; `None` where
-    /// these do not confirm it.
+    /// these do not confirm it. Of what is brightest, most may be leaves and lamps.
     fn adopt(&mut self, hypothesis: &Hypothesis) -> Option<Found> {
+        const STARS: [usize; 3] = [TESTED_STARS, 4 * TESTED_STARS, 16 * TESTED_STARS];
+        let all = self.problem.field.stars.len();
+        let counts = STARS.into_iter().enumerate();
+        let mut counts = counts.filter(|(number, _)| *number == 0 || STARS[number - 1] < all);
+        counts.find_map(|(number, stars)| {
+            let found = self.adopt_with(hypothesis, stars)?;
+            let log10_false_alarm = found.log10_false_alarm + (number as f64 + 1.0).log10();
+            (log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+                log10_false_alarm,
+                ..found
+            })
+        })
+    }
+
+    /// [`Self::adopt`] with so many stars.
+    fn adopt_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<Found> {
         /// Largest distance of true pairs, in diagonals of the frame.
         const RADIUS_SHARE: f64 = 0.002;
         let radius_px = RADIUS_SHARE * self.observed.diagonal_px;
@@ -201,16 +217,16 @@ impl<'a> Search<'a> {
             hypothesis,
             radius_px,
             sceptical: false,
-            stars: TESTED_STARS,
+            stars,
             richest: DistortionModel::BrownConrady,
         };
         let refined = self.buffers.refiner.refine(self.problem, &start)?;
-        let log10 = self.log10_with(&refined.hypothesis(), TESTED_STARS)?;
+        let log10 = self.log10_of_agreement(self.problem.field, &refined.hypothesis())?;
         self.best_log10 = Some(log10);
         (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
             log10_false_alarm: log10,
             refined,
-            stars: TESTED_STARS,
+            stars,
             first: *hypothesis,
             radius_px,
         })

@@ -5,12 +5,14 @@ use crate::camera::frame_centre;
 use crate::identify::field::{ObservedStar, StarField};
 use crate::identify::priors::{Priors, ScalePrior};
 
-/// Side of the large window and of the small ones, in units of the frame's shorter side.
+/// Side of the large window, of the small ones and of the smallest, in units of the frame's shorter side.
 const LARGE: f64 = 0.5;
 const SMALL: f64 = 0.25;
+const SMALLEST: f64 = 0.16;
 /// Centres of the windows from that of the frame, in units of the frame's shorter side, and their
 /// sides. The middle comes first: lenses distort least there, and it is highest in the sky.
-const WINDOWS: [([f64; 2], f64); 10] = [
+const WINDOWS: [([f64; 2], f64); 11] = [
+    ([0.0, 0.0], SMALLEST),
     ([0.0, 0.0], SMALL),
     ([0.0, 0.0], LARGE),
     ([-SMALL, 0.0], SMALL),
@@ -22,8 +24,9 @@ const WINDOWS: [([f64; 2], f64); 10] = [
     ([-SMALL, SMALL], SMALL),
     ([SMALL, -SMALL], SMALL),
 ];
-/// Fewest stars that are worth a search.
+/// Fewest stars that are worth a search, and in the smallest window.
 const MIN_STARS: usize = 8;
+const MIN_STARS_OF_SMALLEST: usize = 25;
 
 /// A window.
 #[derive(Debug, Clone)]
@@ -33,7 +36,9 @@ pub struct Window {
     /// Its first pixel in the frame.
     corner: PixelPoint,
     /// Whether it is in the middle of the frame.
-    pub is_central: bool,
+    is_central: bool,
+    /// Whether it is worth a long search: in the middle, and not the smallest.
+    pub is_main: bool,
 }
 
 impl Window {
@@ -87,7 +92,12 @@ impl Windows {
                     .iter()
                     .filter_map(|star| inside(star, &corner, side_px)),
             );
-            let is_worth_it = stars.len() >= MIN_STARS;
+            let least = if side < SMALL {
+                MIN_STARS_OF_SMALLEST
+            } else {
+                MIN_STARS
+            };
+            let is_worth_it = stars.len() >= least;
             let window = Window {
                 field: StarField {
                     width_px: side_px,
@@ -98,6 +108,7 @@ impl Windows {
                 },
                 corner,
                 is_central: [x, y] == [0.0; 2],
+                is_main: [x, y] == [0.0; 2] && side >= SMALL,
             };
             match self.0.get_mut(count) {
                 Some(reused) => *reused = window,
@@ -134,7 +145,7 @@ mod tests {
         let field = StarField::of_places([1000.0, 800.0], &places);
         let mut windows = Windows::default();
         let all = windows.of(&field);
-        assert_eq!(all.len(), 10);
+        assert_eq!(all.len(), 10, "the smallest has too few");
         for window in all {
             assert!(window.field.stars.windows(2).all(|w| w[0].mag < w[1].mag));
             for star in &window.field.stars {
