@@ -105,6 +105,13 @@ pub struct Detections {
 }
 
 impl Detections {
+    /// Whether something dark is in front of the sky at a place.
+    pub(crate) fn is_dark(&self, place: &PixelPoint) -> bool {
+        self.sky_area
+            .as_ref()
+            .is_some_and(|area| area.is_dark(place))
+    }
+
     /// Whether the sky is seen at a place.
     pub(crate) fn shows_sky(&self, place: &PixelPoint) -> bool {
         self.sky_area.as_ref().is_none_or(|area| area.shows(place))

@@ -6,13 +6,13 @@ use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 use crate::photometry::instrumental_mag;
 use crate::sky::places::StarPlaces;
 
-/// The detections in the sky that may be stars, as identification takes them.
+/// The detections that may be stars, as identification takes them.
 pub fn star_field(frame: &Frame, detections: &Detections, places: StarPlaces) -> StarField {
     let is_star = |source: &Detection| source.flags.is_star_like();
     field_of(is_star, frame, detections, places)
 }
 
-/// The detections in the sky for which `is_star` holds, as identification takes them.
+/// The detections for which `is_star` holds, without those in front of the sky, as identification takes them.
 pub(super) fn field_of(
     is_star: impl Fn(&Detection) -> bool,
     frame: &Frame,
@@ -22,7 +22,7 @@ pub(super) fn field_of(
     let sources = detections.sources.iter().enumerate();
     let stars = sources
         .filter(|(_, source)| is_star(source) && source.flux_adu > 0.0)
-        .filter(|(_, source)| detections.shows_sky(&source.position))
+        .filter(|(_, source)| !detections.is_dark(&source.position))
         .map(|(index, source)| {
             let variance_px2 = (source.sigma_x_px.powi(2) + source.sigma_y_px.powi(2)) / 2.0;
             ObservedStar {

@@ -23,6 +23,7 @@ fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
         vmag: id.map(|_| 0.45),
         ra_deg: Some(88.792_939_2),
         dec_deg: Some(7.407_063_1),
+        airmass: None,
         residual_px: id.map(|_| 0.0712),
         residual_blend_px: name.map(|_| 0.0312),
         p_chance: id.map(|_| 3.1e-7),
@@ -60,6 +61,7 @@ fn unidentified() -> FrameReport {
         background: BackgroundReport {
             level: Some(1012.25),
             noise: Some(12.3418),
+            sky_share: Some(0.8125),
         },
         bodies: Vec::new(),
         stars: vec![StarReport {
@@ -168,6 +170,7 @@ fn identified() -> FrameReport {
             dark: Some("master-dark.fits".to_owned()),
             flat: None,
             hot_pixels: Some("hot-pixels.csv".to_owned()),
+            mask: None,
         }),
         notes: vec![NoteReport {
             code: "header_value_ignored",

@@ -1,6 +1,6 @@
 //! The circle that the sky fills in a picture by an all-sky lens.
 
-use super::SkyArea;
+use super::{Cell, SkyArea};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
@@ -22,14 +22,15 @@ const MIN_CELLS: usize = 60;
 impl SkyArea {
     /// The circle that the sky fills, if its edge is one that the frame's corners lie outside of.
     pub(crate) fn circle(&self) -> Option<Circle> {
-        let rows = self.hidden.len() / self.columns;
+        let rows = self.cells.len() / self.columns;
+        let is_dark = |cell: usize| self.cells[cell] == Cell::Dark;
         let corners = [
             0,
             self.columns - 1,
-            self.hidden.len() - self.columns,
-            self.hidden.len() - 1,
+            self.cells.len() - self.columns,
+            self.cells.len() - 1,
         ];
-        if !corners.iter().all(|corner| self.hidden[*corner]) {
+        if !corners.iter().all(|corner| is_dark(*corner)) {
             return None;
         }
         let is_edge = |cell: &usize| {
@@ -41,11 +42,11 @@ impl SkyArea {
                 cell.wrapping_sub(self.columns),
                 cell + self.columns,
             ];
-            is_inner && !self.hidden[*cell] && around.iter().any(|next| self.hidden[*next])
+            is_inner && !is_dark(*cell) && around.iter().any(|next| is_dark(*next))
         };
         let cell_px = self.cell_px as f64;
         let middle_px = |at: usize| (at as f64 + 0.5) * cell_px - 0.5;
-        let edge: Vec<PixelPoint> = (0..self.hidden.len())
+        let edge: Vec<PixelPoint> = (0..self.cells.len())
             .filter(is_edge)
             .map(|cell| {
                 PixelPoint::new(
@@ -103,11 +104,17 @@ mod tests {
     /// A sky area of 64 × 48 cells of 10 px.
     fn area(is_hidden: impl Fn(f64, f64) -> bool) -> SkyArea {
         let middle = |at: usize| (at as f64 + 0.5) * 10.0 - 0.5;
-        let cells = (0..64 * 48).map(|cell| is_hidden(middle(cell % 64), middle(cell / 64)));
+        let cells = (0..64 * 48).map(|cell| {
+            if is_hidden(middle(cell % 64), middle(cell / 64)) {
+                Cell::Dark
+            } else {
+                Cell::Sky
+            }
+        });
         SkyArea {
             cell_px: 10,
             columns: 64,
-            hidden: cells.collect(),
+            cells: cells.collect(),
         }
     }
 

@@ -12,13 +12,23 @@ pub use circle::Circle;
 use levels::Levels;
 use std::sync::Arc;
 
+/// What a cell of a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cell {
+    Sky,
+    /// Something dark in front of the sky, the border around a lens's circle, or nothing.
+    Dark,
+    /// A lamp, or the Moon.
+    Lit,
+}
+
 /// The part of a frame that shows the sky, in cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkyArea {
     cell_px: usize,
     columns: usize,
-    /// Whether each cell is hidden, row by row.
-    hidden: Arc<[bool]>,
+    /// Row by row.
+    cells: Arc<[Cell]>,
 }
 
 impl SkyArea {
@@ -31,26 +41,36 @@ impl SkyArea {
     ) -> Option<Self> {
         let levels = Levels::of(frame, saturation_adu);
         let stars = levels.count(detections);
-        let hidden = regions::hidden(&levels, &stars);
-        hidden.contains(&true).then(|| Self {
+        let cells = regions::cells(&levels, &stars);
+        let is_hidden = |cell: &Cell| *cell != Cell::Sky;
+        cells.iter().any(is_hidden).then(|| Self {
             cell_px: levels.cell_px,
             columns: levels.columns,
-            hidden: hidden.into(),
+            cells: cells.into(),
         })
     }
 
     /// Whether the sky is seen at a place.
     pub fn shows(&self, place: &PixelPoint) -> bool {
-        let rows = self.hidden.len() / self.columns;
+        self.cell_at(place) == Cell::Sky
+    }
+
+    /// Whether something dark is at a place: light there is not that of a star, but comes through leaves.
+    pub(crate) fn is_dark(&self, place: &PixelPoint) -> bool {
+        self.cell_at(place) == Cell::Dark
+    }
+
+    fn cell_at(&self, place: &PixelPoint) -> Cell {
+        let rows = self.cells.len() / self.columns;
         let cell =
             |at: f64, cells: usize| ((at + 0.5).max(0.0) as usize / self.cell_px).min(cells - 1);
-        !self.hidden[cell(place.y, rows) * self.columns + cell(place.x, self.columns)]
+        self.cells[cell(place.y, rows) * self.columns + cell(place.x, self.columns)]
     }
 
     /// The share of the frame that shows the sky.
     pub fn share(&self) -> f64 {
-        let seen = self.hidden.iter().filter(|hidden| !**hidden).count();
-        seen as f64 / self.hidden.len() as f64
+        let seen = self.cells.iter().filter(|cell| **cell == Cell::Sky).count();
+        seen as f64 / self.cells.len() as f64
     }
 }
 
@@ -70,8 +90,10 @@ mod tests {
         has_stars: impl Fn(f64, f64) -> bool,
     ) -> Option<SkyArea> {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let mut noise = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-        let pixel = |index| level((index % WIDTH) as f64, (index / WIDTH) as f64) + 2.0 * noise();
+        let mut pixel = |index| {
+            let noise = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+            level((index % WIDTH) as f64, (index / WIDTH) as f64) + 2.0 * noise
+        };
         let mut pixels: Vec<f32> = (0..WIDTH * HEIGHT)
             .map(|index| pixel(index) as f32)
             .collect();

@@ -1,5 +1,6 @@
 //! Dark areas with a sharp edge and few stars.
 
+use super::Cell;
 use super::levels::Levels;
 use image::{GrayImage, ImageBuffer, Luma};
 use imageproc::distance_transform::Norm;
@@ -34,17 +35,33 @@ struct Region {
     contrasts: Vec<f32>,
 }
 
-/// Whether each cell is hidden.
-pub(super) fn hidden(levels: &Levels, stars: &[u32]) -> Vec<bool> {
-    let mut hidden = image_of(levels, |cell| levels.is_saturated(cell));
-    if hidden.pixels().any(|pixel| *pixel == INSIDE) {
-        hidden = dilate(&hidden, Norm::LInf, 1);
-    }
+/// What each cell shows.
+pub(super) fn cells(levels: &Levels, stars: &[u32]) -> Vec<Cell> {
+    // Saturated stars are smaller.
+    let lit = image_of(levels, |cell| levels.is_saturated(cell));
+    let lit = dilate(&open(&lit, Norm::LInf, 1), Norm::LInf, 1);
+    let dark = dark(levels, stars);
+    let cell = |((level, lit), dark): ((&f32, &Luma<u8>), &Luma<u8>)| {
+        if level.is_nan() || *dark == INSIDE {
+            Cell::Dark
+        } else if *lit == INSIDE {
+            Cell::Lit
+        } else {
+            Cell::Sky
+        }
+    };
+    let sides = levels.adu.iter().zip(lit.pixels()).zip(dark.pixels());
+    sides.map(cell).collect()
+}
+
+/// The dark areas that do not show the sky.
+fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
+    let mut hidden = image_of(levels, |_| false);
     let seen = levels.adu.iter().copied().filter(|level| !level.is_nan());
     let mut sorted: Vec<f32> = seen.collect();
     sorted.sort_unstable_by(f32::total_cmp);
     let Some(last) = sorted.len().checked_sub(1) else {
-        return vec![true; levels.adu.len()];
+        return hidden;
     };
     let end = |share: f64| sorted[(share * last as f64) as usize];
     let [lowest, highest] = [TAIL, 1.0 - TAIL].map(end);
@@ -65,8 +82,7 @@ pub(super) fn hidden(levels: &Levels, stars: &[u32]) -> Vec<bool> {
             }
         }
     }
-    let is_hidden = |(pixel, level): (&Luma<u8>, &f32)| *pixel == INSIDE || level.is_nan();
-    hidden.pixels().zip(&levels.adu).map(is_hidden).collect()
+    hidden
 }
 
 fn image_of(levels: &Levels, is_inside: impl Fn(usize) -> bool) -> GrayImage {

@@ -222,6 +222,7 @@ mod tests {
         let sky = Background {
             level_adu: 22.0,
             noise_adu: 2.9,
+            sky_share: 1.0,
         };
         let grey = Grey::of(&frame, Some(&sky));
         assert_eq!(grey.levels[315 * width + 415], 255);
