@@ -354,10 +354,7 @@ impl fmt::Display for Note {
             Self::RowsLeftOut(rows) => rows.fmt(f),
             Self::DefectiveColumns(columns) => write_columns(f, columns),
             Self::ColorMosaic(mosaic) => write_mosaic(f, mosaic),
-            Self::OtherLens { known_px, found_px } => write!(
-                f,
-                "the stars are not where the lens in the description of the camera sees them: another lens, another focus, or it has moved; its focal length is {known_px:.2} px, that of this frame {found_px:.2} px"
-            ),
+            Self::OtherLens { known_px, found_px } => write_other_lens(f, *known_px, *found_px),
             Self::LensOfOtherSize { known_px, found_px } => {
                 write_other_size(f, *known_px, *found_px)
             }
@@ -380,12 +377,7 @@ impl fmt::Display for Note {
                  frame, and so all were measured"
             ),
             Self::Camera(contradiction) => contradiction.fmt(f),
-            Self::RoundPicture(Circle { centre, radius_px }) => write!(
-                f,
-                "the sky fills a circle of {radius_px:.0} px around ({:.0}, {:.0}): this looks like a fisheye \
-                 lens, whose middle is identified first; stars are needed there",
-                centre.x, centre.y
-            ),
+            Self::RoundPicture(circle) => write_circle(f, circle),
             Self::NotLinear { slope, mean_v_mag } => write!(
                 f,
                 "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",
@@ -431,6 +423,25 @@ fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64
         "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors \
          explain: the lens or the spots are not as assumed; the stated errors include \
          {excess_sigma_px:.1} px a star on each axis"
+    )
+}
+
+fn write_other_lens(f: &mut fmt::Formatter<'_>, known_px: f64, found_px: f64) -> fmt::Result {
+    write!(
+        f,
+        "the stars are not where the lens in the description of the camera sees them: another lens, \
+         another focus, or it has moved; its focal length is {known_px:.2} px, that of this frame \
+         {found_px:.2} px"
+    )
+}
+
+fn write_circle(f: &mut fmt::Formatter<'_>, circle: &Circle) -> fmt::Result {
+    let Circle { centre, radius_px } = circle;
+    write!(
+        f,
+        "the sky fills a circle of {radius_px:.0} px around ({:.0}, {:.0}): this looks like a fisheye lens, \
+         whose middle is identified first; stars are needed there",
+        centre.x, centre.y
     )
 }
 

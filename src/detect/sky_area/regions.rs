@@ -15,6 +15,8 @@ const TAIL: f64 = 0.01;
 const EDGE_CELLS: isize = 3;
 /// Least change across a sharp edge, over the brightness of the brighter side.
 const MIN_CONTRAST: f32 = 0.25;
+/// Share of the range of levels, below which the brightness of the brighter side counts as that.
+const MIN_SHARE: f32 = 0.5;
 /// Largest density of stars in a hidden area, over that in the rest of the frame.
 const MAX_STARS: f64 = 0.2;
 /// Least number of stars that a sky of this size should show for their absence to count.
@@ -73,7 +75,7 @@ fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
         let dark = image_of(levels, |cell| levels.adu[cell] < cut_adu);
         let dark = open(&dark, Norm::LInf, 1);
         let labels = connected_components(&dark, Connectivity::Four, OUTSIDE);
-        let regions = measure(levels, stars, &labels, sorted[0]);
+        let regions = measure(levels, stars, &labels, [sorted[0], highest]);
         let is_hidden = |region: &Region| region.is_hidden(levels, all_stars);
         let are_hidden: Vec<bool> = regions.iter().map(is_hidden).collect();
         for (pixel, label) in hidden.pixels_mut().zip(labels.pixels()) {
@@ -97,7 +99,12 @@ fn image_of(levels: &Levels, is_inside: impl Fn(usize) -> bool) -> GrayImage {
 }
 
 /// The regions by label; number 0 is what lies outside all.
-fn measure(levels: &Levels, stars: &[u32], labels: &Labels, darkest_adu: f32) -> Vec<Region> {
+fn measure(
+    levels: &Levels,
+    stars: &[u32],
+    labels: &Labels,
+    [darkest_adu, highest_adu]: [f32; 2],
+) -> Vec<Region> {
     let labels: Vec<usize> = labels.pixels().map(|label| label.0[0] as usize).collect();
     let count = labels.iter().max().map_or(0, |most| most + 1);
     let mut regions = vec![Region::default(); count];
@@ -112,8 +119,10 @@ fn measure(levels: &Levels, stars: &[u32], labels: &Labels, darkest_adu: f32) ->
             if let (true, Some(outer)) = (is_at_edge, at(EDGE_CELLS)) {
                 let dark = levels.adu[at(-1).unwrap_or(cell)];
                 let bright = levels.adu[outer];
-                let above_darkest = (bright - darkest_adu).max(f32::MIN_POSITIVE);
-                region.contrasts.push((bright - dark) / above_darkest);
+                // What is hardly brighter than the darkest cell has no edge, either.
+                let least = MIN_SHARE * (highest_adu - darkest_adu);
+                let scale = (bright - darkest_adu).max(least).max(f32::MIN_POSITIVE);
+                region.contrasts.push((bright - dark) / scale);
             }
         }
     }
