@@ -91,7 +91,9 @@ impl Workspace {
             return None;
         }
         let saturation_adu = config.saturation_adu(frame, &mut self.saturation);
-        SkyArea::of_picture(frame, found, saturation_adu)
+        let stars = found.sources.iter();
+        let stars = stars.filter(|source| source.flags.is_star_like());
+        SkyArea::of_picture(frame, stars.map(|star| star.position), saturation_adu)
     }
 
     /// Whether so many bytes fit its memory beside `frame`.

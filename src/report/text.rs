@@ -2,12 +2,13 @@
 
 use super::frame_report::{
     AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
-    ObservationReport, OpticsReport, PhotometryReport, StarReport,
+    ObservationReport, OpticsReport, PhotometryReport, StarReport, Status,
 };
 use crate::base::format::{self, counted, decimals_for, printable};
 use crate::base::remedy::{OptionNames, Remedy};
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::identify::DateSource;
+use crate::pipeline::Note;
 use crate::sky::places::AttitudeFrame;
 
 /// Number of stars listed without [`TextOptions::all_stars`].
@@ -51,7 +52,12 @@ impl FrameReport {
         lines.push(self.date_line(options.option_names));
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.calibration.iter().map(calibration_line));
-        lines.extend(self.notes.iter().map(|note| labelled("note", &note.text)));
+        // The line of the date has said it.
+        let notes = self
+            .notes
+            .iter()
+            .filter(|note| note.code != Note::NoDate.code());
+        lines.extend(notes.map(|note| labelled("note", &note.text)));
         lines.extend(self.background_line());
         lines.extend(self.sky_line());
         lines.push(self.timing_line());
@@ -99,7 +105,13 @@ impl FrameReport {
             }
             None => {
                 let see = names.see(&[Remedy::Date]);
-                format!("no date: positions for J2000.0{see}")
+                let error = match self.status {
+                    Status::Identified => {
+                        ", without aberration, and the error of the focal length includes that"
+                    }
+                    Status::NotIdentified => "",
+                };
+                format!("no date: positions for J2000.0{error}{see}")
             }
         };
         labelled("date", &text)

@@ -39,6 +39,7 @@ mod robustness;
 mod schema;
 mod simulate;
 mod simulate_files;
+mod sky_area;
 mod solar_system;
 mod spots;
 mod terminal;

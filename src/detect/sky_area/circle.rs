@@ -1,6 +1,7 @@
 //! The circle that the sky fills in a picture by an all-sky lens.
 
-use super::{Cell, SkyArea};
+use super::SkyArea;
+use super::regions::Cell;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};

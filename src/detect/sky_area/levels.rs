@@ -1,6 +1,6 @@
 //! The brightness of a frame in cells.
 
-use crate::detect::detection::Detections;
+use crate::base::coords::PixelPoint;
 use crate::frame::Frame;
 
 /// Cells along the longer side of a frame.
@@ -74,13 +74,11 @@ impl Levels {
         Some(y * self.columns + x)
     }
 
-    /// The number of detections in each cell that look like stars.
-    pub fn count(&self, detections: &Detections) -> Vec<u32> {
+    /// The number of stars in each cell.
+    pub fn count(&self, stars: impl Iterator<Item = PixelPoint>) -> Vec<u32> {
         let mut counts = vec![0; self.adu.len()];
-        let stars = detections.sources.iter();
-        for star in stars.filter(|star| star.flags.is_star_like()) {
-            let cell = |at: f64, cells: usize| (at.max(0.0) as usize / self.cell_px).min(cells - 1);
-            let [x, y] = [star.position.x, star.position.y];
+        let cell = |at: f64, cells: usize| (at.max(0.0) as usize / self.cell_px).min(cells - 1);
+        for PixelPoint { x, y } in stars {
             counts[cell(y, self.rows()) * self.columns + cell(x, self.columns)] += 1;
         }
         counts

@@ -5,22 +5,12 @@ mod circle;
 mod levels;
 mod regions;
 
-use super::detection::Detections;
 use crate::base::coords::PixelPoint;
 use crate::frame::Frame;
 pub use circle::Circle;
 use levels::Levels;
+use regions::Cell;
 use std::sync::Arc;
-
-/// What a cell of a frame shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cell {
-    Sky,
-    /// Something dark in front of the sky, the border around a lens's circle, or nothing.
-    Dark,
-    /// A lamp, or the Moon.
-    Lit,
-}
 
 /// The part of a frame that shows the sky, in cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,15 +22,15 @@ pub struct SkyArea {
 }
 
 impl SkyArea {
-    /// What a picture itself tells: an area with a sharp edge that is darker than what is around it and has
+    /// What a picture and the places of its stars tell: an area with a sharp edge that is darker than what is around it and has
     /// few stars, and what is saturated or has no value, do not show the sky. `None` where all does.
     pub(super) fn of_picture(
         frame: &Frame,
-        detections: &Detections,
+        stars: impl Iterator<Item = PixelPoint>,
         saturation_adu: f32,
     ) -> Option<Self> {
         let levels = Levels::of(frame, saturation_adu);
-        let stars = levels.count(detections);
+        let stars = levels.count(stars);
         let cells = regions::cells(&levels, &stars);
         let is_hidden = |cell: &Cell| *cell != Cell::Sky;
         cells.iter().any(is_hidden).then(|| Self {

@@ -1,6 +1,5 @@
 //! Dark areas with a sharp edge and few stars.
 
-use super::Cell;
 use super::levels::Levels;
 use image::{GrayImage, ImageBuffer, Luma};
 use imageproc::distance_transform::Norm;
@@ -21,6 +20,16 @@ const MIN_SHARE: f32 = 0.5;
 const MAX_STARS: f64 = 0.2;
 /// Least number of stars that a sky of this size should show for their absence to count.
 const MIN_EXPECTED_STARS: f64 = 8.0;
+
+/// What a cell of a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cell {
+    Sky,
+    /// Something dark in front of the sky, the border around a lens's circle, or nothing.
+    Dark,
+    /// A lamp, or the Moon.
+    Lit,
+}
 
 /// The number of its region for each cell.
 type Labels = ImageBuffer<Luma<u32>, Vec<u32>>;
