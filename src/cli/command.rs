@@ -13,10 +13,20 @@ use super::identify::IdentifyArgs;
 use super::limit::LimitArgs;
 use super::process::ProcessArgs;
 use super::robustness::RobustnessArgs;
+use super::shell::{CompletionsArgs, ManArgs};
 use super::simulate::SimulateArgs;
 use super::track::TrackArgs;
 use super::validate::ValidateArgs;
 use clap::{Parser, Subcommand};
+
+/// The version with what it was built from.
+fn long_version() -> String {
+    format!(
+        "{}\ncommit {}\ncatalogue SKY2000 version 5 revision 4, built in",
+        env!("CARGO_PKG_VERSION"),
+        option_env!("STARPIPE_COMMIT").unwrap_or("unknown")
+    )
+}
 
 /// Finds and identifies the stars in photographs of the night sky, and determines where the camera
 /// pointed
@@ -24,12 +34,14 @@ use clap::{Parser, Subcommand};
 #[command(
     name = "starpipe",
     version,
+    long_version = long_version(),
     arg_required_else_help = true,
     max_term_width = 100,
     after_help = "Examples:\n  \
-        starpipe process night.tif\n  \
+        starpipe night.tif\n  \
         starpipe process --fov 11.4 --format json *.tif > night.jsonl\n  \
         starpipe identify --pixel-scale 10.8 centroids.csv\n\n\
+        Without a command, frames are processed: starpipe night.tif is starpipe process night.tif.\n\
         Exit status: 0 every frame was identified, 1 something could not be read or written,\n\
         2 the command line is wrong, 3 at least one frame was not identified."
 )]
@@ -74,6 +86,10 @@ pub(crate) enum Command {
     Darks(DarksArgs),
     /// Make a master flat from evenly lit frames, and measure gain and response
     Flats(FlatsArgs),
+    /// Write a script that completes commands and options in a shell
+    Completions(CompletionsArgs),
+    /// Write a manual page
+    Man(ManArgs),
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::progress::frames_bar;
 use anyhow::Context;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
-use starpipe::report::overlay;
+use starpipe::report::overlay::{self, OverlayOptions};
 use starpipe::study::experiment::{Published, Run, Trials, run};
 use std::path::{Path, PathBuf};
 
@@ -90,7 +90,8 @@ fn save_overlay(
         return Ok(());
     };
     let title = format!("{}, simulated", name.display());
-    let picture = overlay::png(&title, frame, solution, indexed.catalog())?;
+    let options = OverlayOptions::default();
+    let picture = overlay::png(&title, frame, solution, indexed.catalog(), &options)?;
     let path = output_path(directory, name, None, "png");
     write_whole(&[(path, picture)])
 }

@@ -17,6 +17,7 @@ mod darks;
 mod defocus;
 mod exit;
 mod experiment;
+mod first_word;
 mod flats;
 mod identify;
 mod input;
@@ -27,6 +28,7 @@ mod plot;
 mod process;
 mod progress;
 mod robustness;
+mod shell;
 mod simulate;
 mod solving;
 mod track;
@@ -44,7 +46,8 @@ use std::process::ExitCode;
 
 /// Runs the command that the command line names.
 pub(crate) fn run() -> ExitCode {
-    let matches = Arguments::command().get_matches();
+    let words = first_word::completed(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let matches = Arguments::command().get_matches_from(words);
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     silence();
     let done = caught(|| run_command(arguments.command));
@@ -84,6 +87,8 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Experiment(arguments) => experiment::experiment(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => shell::man(&arguments, Arguments::command()),
     }
 }
 

@@ -664,3 +664,71 @@ fn a_list_of_a_frames_stars_is_identified_as_the_frame() {
     assert!(from_list[0]["background"]["level"].is_null());
     assert!(from_list[0]["stars"][0]["snr"].is_null());
 }
+
+#[test]
+fn frames_alone_are_processed_and_other_names_of_commands_point_to_them() {
+    let orion = "fixtures/orion/orion.png";
+    let alone = run(&[orion, "--format", "json"]);
+    let named = run(&["process", orion, "--format", "json"]);
+    assert_eq!(alone.status, 0, "{}", alone.stderr);
+    let stars = |ran: &Ran| ran.reports()[0]["stars"].clone();
+    assert_eq!(stars(&alone), stars(&named));
+    let solve = run(&["solve", orion]);
+    assert_eq!(solve.status, 2);
+    assert!(
+        solve.stderr.contains("starpipe process --help"),
+        "{}",
+        solve.stderr
+    );
+}
+
+#[test]
+fn a_table_has_a_line_for_each_frame_and_a_summary() {
+    let directory = tempfile::tempdir().unwrap();
+    let black = directory.path().join("black.png");
+    image::GrayImage::new(64, 64).save(&black).unwrap();
+    let black = black.display().to_string();
+    let frames = [
+        "fixtures/orion/orion.png",
+        "fixtures/cygnus/cygnus.tif",
+        &black,
+    ];
+    let table = run(&[&["process", "--format", "table"][..], &frames].concat());
+    assert_eq!(table.status, 3, "{}", table.stderr);
+    let lines: Vec<&str> = table.stdout.lines().collect();
+    assert_eq!(lines.len(), 6, "{}", table.stdout);
+    assert!(lines[0].starts_with("frame") && lines[1].contains("83.7"));
+    assert!(
+        lines[3].ends_with("not identified: no_variation"),
+        "{}",
+        lines[3]
+    );
+    assert!(
+        lines[5].starts_with("3 frames: 2 identified, 1 no_variation, "),
+        "{}",
+        lines[5]
+    );
+    assert!(lines[..4].iter().all(|line| line.chars().count() <= 80));
+
+    let rows = run(&[&["process", "--format", "frames-csv"][..], &frames].concat());
+    let mut reader = csv::Reader::from_reader(rows.stdout.as_bytes());
+    assert_eq!(reader.headers().unwrap().get(0), Some("frame"));
+    let statuses: Vec<String> = reader
+        .records()
+        .map(|row| row.unwrap()[1].to_owned())
+        .collect();
+    assert_eq!(statuses, ["identified", "identified", "not_identified"]);
+}
+
+#[test]
+fn shells_and_manuals_know_the_options() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = run(&["completions", shell]);
+        assert_eq!(script.status, 0, "{}", script.stderr);
+        assert!(script.stdout.contains("pixel-scale"), "{shell}");
+    }
+    let page = run(&["man", "process"]).stdout;
+    assert!(page.contains(".TH starpipe-process 1") && page.contains("pixel\\-scale"));
+    assert!(run(&["man"]).stdout.contains("starpipe\\-process(1)"));
+    assert_eq!(run(&["man", "proces"]).status, 2);
+}

@@ -1,6 +1,7 @@
 //! What `process` and `identify` share: each input is solved, its report printed, its result files
 //! written.
 
+mod frame_table;
 mod images;
 pub(crate) mod options;
 mod printer;

@@ -2,12 +2,12 @@
 
 use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
-use crate::cli::options::format::Format;
 use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
 use clap::{Args, ValueEnum};
 use starpipe::identify::{Effort, NAME_ODDS};
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
+use starpipe::report::overlay::{OverlayOptions, Rings, Stretch};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -55,12 +55,27 @@ impl From<EffortOption> for Effort {
     }
 }
 
+/// The forms of reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ReportFormat {
+    /// A report for people
+    Text,
+    /// A line for each frame, and a summary
+    Table,
+    /// One JSON object a line
+    Json,
+    /// A table of the stars
+    Csv,
+    /// A table of the frames
+    FramesCsv,
+}
+
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(super) struct OutputOptions {
-    /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(super) format: Format,
+    /// What to print [default: text; table for several inputs on a terminal]
+    #[arg(long, value_enum)]
+    pub(super) format: Option<ReportFormat>,
     /// With --format text, list every identified star and not just the brightest
     #[arg(long)]
     pub(super) all_stars: bool,
@@ -68,6 +83,52 @@ pub(super) struct OutputOptions {
     /// if the frame is identified) and, for frames, FRAME.png (the stars marked and named)
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+    /// How FRAME.png shows the frame
+    #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
+    stretch: StretchOption,
+    /// Which detections FRAME.png marks
+    #[arg(long, value_enum, default_value_t = RingsOption::Named, requires = "out")]
+    rings: RingsOption,
+}
+
+/// How an overlay shows the frame.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StretchOption {
+    /// In proportion to its levels
+    None,
+    /// With a dark sky brightened
+    Soft,
+    /// Without its background, so that faint stars show
+    Hard,
+}
+
+/// Which detections an overlay marks.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum RingsOption {
+    /// The brightest identified stars, with their names; all where the frame is not identified
+    Named,
+    /// All
+    All,
+    /// None
+    None,
+}
+
+impl OutputOptions {
+    /// How to draw overlays.
+    pub(super) fn overlay(&self) -> OverlayOptions {
+        let mut options = OverlayOptions::default();
+        options.stretch = match self.stretch {
+            StretchOption::None => Stretch::None,
+            StretchOption::Soft => Stretch::Soft,
+            StretchOption::Hard => Stretch::Hard,
+        };
+        options.rings = match self.rings {
+            RingsOption::Named => Rings::Named,
+            RingsOption::All => Rings::All,
+            RingsOption::None => Rings::None,
+        };
+        options
+    }
 }
 
 impl SolvingOptions {

@@ -1,45 +1,98 @@
 //! Reports on standard output, one after the other.
 
-use super::options::OutputOptions;
+use super::frame_table::{self, Summary};
+use super::options::{OutputOptions, ReportFormat};
 use super::result_files::table;
-use crate::cli::options::format::Format;
+use crate::cli::exit::Tally;
+use crate::cli::output::rows::finished;
 use crate::cli::output::stdout::print;
+use starpipe::archive::FrameRow;
 use starpipe::base::remedy::OptionNames;
+use starpipe::base::table::write_row;
 use starpipe::report::{FrameReport, TextOptions};
+use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
 
 /// Prints reports as they come.
 pub(super) struct Printer {
-    format: Format,
+    format: ReportFormat,
     text: TextOptions,
     reports: usize,
+    summary: Summary,
 }
 
 impl Printer {
-    pub(super) fn new(options: &OutputOptions) -> Self {
+    /// For so many inputs.
+    pub(super) fn new(options: &OutputOptions, inputs: usize) -> Self {
         let mut text = TextOptions::default();
         text.all_stars = options.all_stars;
         text.option_names = OptionNames::Flags;
+        let is_table = inputs > 1 && !options.all_stars && io::stdout().is_terminal();
+        let usual = if is_table {
+            ReportFormat::Table
+        } else {
+            ReportFormat::Text
+        };
         Self {
-            format: options.format,
+            format: options.format.unwrap_or(usual),
             text,
             reports: 0,
+            summary: Summary::new(),
         }
     }
 
-    /// Prints `report`. Breaks if the reader has closed the pipe.
-    pub(super) fn print(&mut self, report: &FrameReport) -> anyhow::Result<ControlFlow<()>> {
-        let is_first = self.reports == 0;
-        self.reports += 1;
-        print(&self.format(report, is_first)?)
+    /// Whether rows of frames are printed.
+    pub(super) fn needs_rows(&self) -> bool {
+        self.format == ReportFormat::FramesCsv
     }
 
-    fn format(&self, report: &FrameReport, is_first: bool) -> anyhow::Result<String> {
+    /// Prints a report and its row. Breaks if the reader has closed the pipe.
+    pub(super) fn print(
+        &mut self,
+        report: &FrameReport,
+        row: Option<&FrameRow>,
+    ) -> anyhow::Result<ControlFlow<()>> {
+        let is_first = self.reports == 0;
+        self.reports += 1;
+        self.summary.add(report);
+        print(&self.format(report, row, is_first)?)
+    }
+
+    /// Prints what follows the last report.
+    pub(super) fn finish(&mut self, tally: &Tally) -> anyhow::Result<ControlFlow<()>> {
+        if self.format != ReportFormat::Table {
+            return Ok(ControlFlow::Continue(()));
+        }
+        print(&self.summary.text(tally))
+    }
+
+    fn format(
+        &self,
+        report: &FrameReport,
+        row: Option<&FrameRow>,
+        is_first: bool,
+    ) -> anyhow::Result<String> {
         Ok(match self.format {
-            Format::Text if is_first => report.to_text(self.text),
-            Format::Text => format!("\n{}", report.to_text(self.text)),
-            Format::Json => report.to_json_line()? + "\n",
-            Format::Csv => table(report, is_first)?,
+            ReportFormat::Text if is_first => report.to_text(self.text),
+            ReportFormat::Text => format!("\n{}", report.to_text(self.text)),
+            ReportFormat::Table if is_first => frame_table::header() + &frame_table::row(report),
+            ReportFormat::Table => frame_table::row(report),
+            ReportFormat::Json => report.to_json_line()? + "\n",
+            ReportFormat::Csv => table(report, is_first)?,
+            ReportFormat::FramesCsv => frame_rows(row, is_first)?,
         })
     }
+}
+
+/// A row of the table of frames, after the names of its columns where it is the first.
+fn frame_rows(row: Option<&FrameRow>, is_first: bool) -> anyhow::Result<String> {
+    let columns = FrameRow::columns();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    if is_first {
+        writer.write_record(columns.iter().map(|column| column.name))?;
+    }
+    if let Some(row) = row {
+        write_row(&mut writer, &columns, row)?;
+    }
+    finished(writer)
 }

@@ -10,6 +10,7 @@ use crate::cli::output::messages::report_error;
 use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
+use starpipe::archive::FrameRow;
 use starpipe::calibration::Calibration;
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::frame::{ImageName, MemoryLimit};
@@ -52,14 +53,15 @@ pub(crate) fn report_all(
         overwrite::check(paths, directory, inputs.result_extensions())?;
     }
     let mut run = Run {
-        printer: Printer::new(&output),
+        printer: Printer::new(&output, paths.len()),
         progress: match paths.len() {
             0 | 1 => ProgressBar::hidden(),
             count => frames_bar(count as u64),
         },
         tally: Tally::default(),
     };
-    let files = ResultFiles::new(output.out)?;
+    let files = ResultFiles::new(output.out.clone(), output.overlay())?;
+    let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
         catalog.with_index(|pool, indexed| {
             let solver = Solver {
@@ -69,6 +71,7 @@ pub(crate) fn report_all(
                 memory: plan.memory,
                 sink: Reports {
                     files,
+                    needs_rows,
                     catalog: indexed.catalog(),
                 },
             };
@@ -77,18 +80,22 @@ pub(crate) fn report_all(
         })?;
     }
     run.progress.finish_and_clear();
+    let _ = run.printer.finish(&run.tally)?;
     Ok(run.tally.exit())
 }
 
 /// Makes reports and result files. The threads that solve also draw and write; one only prints.
 struct Reports<'a> {
     files: ResultFiles,
+    /// Whether rows of the table of frames are wanted.
+    needs_rows: bool,
     catalog: &'a Catalog,
 }
 
 /// The report of an image, and whether its files could be written.
 struct Report {
     report: FrameReport,
+    row: Option<FrameRow>,
     saved: anyhow::Result<()>,
 }
 
@@ -98,7 +105,10 @@ impl Sink for Reports<'_> {
     fn make(&self, image: &ImageName, solved: &Solved) -> Report {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
         let saved = self.files.save(image, solved, &report, self.catalog);
-        Report { report, saved }
+        let row = self
+            .needs_rows
+            .then(|| FrameRow::new(&report, &solved.solution));
+        Report { report, row, saved }
     }
 }
 
@@ -122,13 +132,15 @@ impl Run {
         })
     }
 
-    fn take(&mut self, Report { report, saved }: Report) -> ControlFlow<()> {
+    fn take(&mut self, Report { report, row, saved }: Report) -> ControlFlow<()> {
         self.tally.count(report.is_identified());
         if let Err(error) = saved {
             self.fail(&error);
         }
         // The bar is hidden meanwhile: results may go to the same terminal.
-        let printed = self.progress.suspend(|| self.printer.print(&report));
+        let printed = self
+            .progress
+            .suspend(|| self.printer.print(&report, row.as_ref()));
         printed.unwrap_or_else(|error| {
             self.fail(&error);
             ControlFlow::Continue(())

@@ -6,20 +6,22 @@ use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::ImageName;
-use starpipe::report::{FrameReport, overlay, wcs, write_table_header};
+use starpipe::report::overlay::{self, OverlayOptions};
+use starpipe::report::{FrameReport, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 use std::path::PathBuf;
 
 /// Writes result files into a directory, if one is given.
 pub(super) struct ResultFiles {
     directory: Option<PathBuf>,
+    overlay: OverlayOptions,
 }
 
 impl ResultFiles {
     /// Makes the directory, if one is given.
-    pub(super) fn new(directory: Option<PathBuf>) -> anyhow::Result<Self> {
+    pub(super) fn new(directory: Option<PathBuf>, overlay: OverlayOptions) -> anyhow::Result<Self> {
         directory.as_deref().map(make_directory).transpose()?;
-        Ok(Self { directory })
+        Ok(Self { directory, overlay })
     }
 
     /// Writes the files of `image`, all or none, and removes the FITS header of an earlier run if
@@ -44,7 +46,7 @@ impl ResultFiles {
             let name = image.to_path();
             let title = name.file_name().unwrap_or(name.as_os_str());
             let title = title.to_string_lossy();
-            let picture = overlay::png(&title, frame, &solved.solution, catalog)?;
+            let picture = overlay::png(&title, frame, &solved.solution, catalog, &self.overlay)?;
             files.push((path("png"), picture));
         }
         let header = wcs::header(&report.frame, &solved.solution);

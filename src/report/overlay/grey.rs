@@ -1,10 +1,14 @@
 //! The frame as grey levels.
 
+use super::options::Stretch;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::Frame;
 use crate::pipeline::Background;
+
+/// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
+const SKY_LEVELS: [f32; 2] = [0.2, 0.35];
 
 /// The frame as a grey picture.
 pub(super) struct Grey {
@@ -19,9 +23,9 @@ pub(super) struct Grey {
 }
 
 impl Grey {
-    /// `frame` without its background, enlarged or reduced by the smallest whole factor that gives
-    /// a picture of suitable size.
-    pub(super) fn of(frame: &Frame, background: Option<&Background>) -> Self {
+    /// `frame`, stretched, enlarged or reduced by the smallest whole factor that gives a picture of
+    /// suitable size.
+    pub(super) fn of(frame: &Frame, background: Option<&Background>, stretch: Stretch) -> Self {
         /// Frames with a shorter longest side are enlarged to at least this.
         const ENLARGE_BELOW_PX: usize = 800;
         /// Frames with a longer longest side are reduced to at most this.
@@ -37,10 +41,16 @@ impl Grey {
             frame.width.div_ceil(reduced),
             frame.height.div_ceil(reduced),
         );
-        let light = light(frame, reduced, Size::new(width, height));
+        let size = Size::new(width, height);
+        let without_sky = stretch == Stretch::Hard;
+        let light = light(frame, reduced, size, without_sky);
         // The mean of n² pixels has 1/n of the noise.
         let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
-        let small = greys(&light, noise);
+        let small = match stretch {
+            Stretch::None => photograph(&light, None),
+            Stretch::Soft => photograph(&light, Some(SKY_LEVELS)),
+            Stretch::Hard => greys(&light, noise),
+        };
         let levels = if enlarged > 1 {
             enlarge(&small, width, enlarged)
         } else {
@@ -73,20 +83,23 @@ impl Grey {
     }
 }
 
-/// Light above the background: means over squares of `side` pixels, NaN where there is no value.
-fn light(frame: &Frame, side: usize, size: Size) -> Vec<f32> {
+/// Light: means over squares of `side` pixels, NaN where there is no value; above the background, where
+/// that is wanted.
+fn light(frame: &Frame, side: usize, size: Size, without_sky: bool) -> Vec<f32> {
     /// Background cells along the longer side: wide enough to keep the glow around bright stars.
     const CELLS: usize = 16;
     const MIN_CELL_PX: usize = 64;
     let cell_px = (frame.width.max(frame.height) / CELLS).max(MIN_CELL_PX);
-    let background = BackgroundMap::measure(frame, cell_px);
+    let background = without_sky.then(|| BackgroundMap::measure(frame, cell_px));
     let pixels = frame.values();
     let mut levels = vec![0.0; frame.width];
     let mut light = Vec::with_capacity(size.pixels());
     for rows in 0..size.height {
         let mut sums = vec![(0.0_f32, 0_u32); size.width];
         for y in rows * side..((rows + 1) * side).min(frame.height) {
-            background.row(y, &mut levels);
+            if let Some(background) = &background {
+                background.row(y, &mut levels);
+            }
             let row = &pixels[y * frame.width..(y + 1) * frame.width];
             for (x, (pixel, level)) in row.iter().zip(&levels).enumerate() {
                 if !pixel.is_nan() {
@@ -98,6 +111,37 @@ fn light(frame: &Frame, side: usize, size: Size) -> Vec<f32> {
         light.extend(sums.iter().map(|(sum, count)| sum / *count as f32));
     }
     light
+}
+
+/// Converts light to grey: in proportion, or between the levels that nearly all pixels lie between, with the
+/// curve that brings the sky between these levels.
+fn photograph(light: &[f32], sky_levels: Option<[f32; 2]>) -> Vec<u8> {
+    /// Share of the pixels that are black, and that are white.
+    const BLACK_SHARE: f32 = 2e-3;
+    const WHITE_SHARE: f32 = 5e-4;
+    let shares = match sky_levels {
+        Some(_) => [1.0 - BLACK_SHARE, WHITE_SHARE],
+        None => [1.0, 0.0],
+    };
+    let [black, white] = shares.map(|share| level_exceeded_by(light, share));
+    let range = (white - black).max(f32::MIN_POSITIVE);
+    let share = |level: f32| ((level - black) / range).clamp(0.0, 1.0);
+    let sky = share(level_exceeded_by(light, 0.5));
+    let middle = match sky_levels {
+        Some([dark, bright]) if sky > 0.0 && sky < 1.0 => midtones(sky.clamp(dark, bright), sky),
+        _ => 0.5,
+    };
+    // NaN is black, too.
+    let grey = |level: &f32| (255.0 * midtones(middle, share(*level))).round() as u8;
+    light.iter().map(grey).collect()
+}
+
+/// The curve from 0 over (`middle`, ½) to 1.
+///
+/// # Reference
+/// Midtones transfer function, PixInsight's XISF specification 1.0, § 11.5.7.
+fn midtones(middle: f32, x: f32) -> f32 {
+    (middle - 1.0) * x / ((2.0 * middle - 1.0) * x - middle)
 }
 
 /// Converts light to grey with an asinh stretch, from just below the background to the level of
@@ -191,7 +235,7 @@ mod tests {
             ((2600, 100), (1300, 50), 0.5),
             ((5001, 3), (1667, 1), 1.0 / 3.0),
         ] {
-            let grey = Grey::of(&frame(size.0, size.1), None);
+            let grey = Grey::of(&frame(size.0, size.1), None, Stretch::Soft);
             assert_eq!((grey.width, grey.height), picture, "{size:?}");
             assert_eq!(grey.levels.len(), grey.width * grey.height);
             assert_eq!(grey.scale(), scale, "{size:?}");
@@ -200,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
-        let grey = Grey::of(&frame(400, 400), None);
+        let grey = Grey::of(&frame(400, 400), None, Stretch::None);
         assert_eq!(grey.position_of(&PixelPoint::new(0.0, 399.0)), [1.0, 799.0]);
     }
 
@@ -224,7 +268,7 @@ mod tests {
             noise_adu: 2.9,
             sky_share: 1.0,
         };
-        let grey = Grey::of(&frame, Some(&sky));
+        let grey = Grey::of(&frame, Some(&sky), Stretch::Hard);
         assert_eq!(grey.levels[315 * width + 415], 255);
         assert_eq!(grey.levels[5], 0);
         let mean = |from: usize| {
@@ -235,5 +279,33 @@ mod tests {
         let (left, right) = (mean(0), mean(width - 100));
         assert!((10.0..60.0).contains(&left), "{left}");
         assert!((left - right).abs() < 8.0, "{left} {right}");
+    }
+
+    #[test]
+    fn a_dark_sky_is_brightened_and_a_bright_one_darkened() {
+        assert!((midtones(midtones(0.2, 0.01), 0.01) - 0.2).abs() < 1e-6);
+        let noise = |i: usize| ((i * 7919) % 101) as f32 / 101.0;
+        let with_sky = |level: f32| -> Vec<f32> {
+            let star = |i: usize| if i.is_multiple_of(1000) { 1000.0 } else { 0.0 };
+            (0..100_000)
+                .map(|i| level + 4.0 * noise(i) + star(i))
+                .collect()
+        };
+        let middle = |greys: Vec<u8>| {
+            greys[50_001..50_102]
+                .iter()
+                .map(|g| f64::from(*g))
+                .sum::<f64>()
+                / 101.0
+        };
+        let dark = middle(photograph(&with_sky(10.0), Some(SKY_LEVELS)));
+        assert!((40.0..60.0).contains(&dark), "{dark}");
+        let plain = middle(photograph(&with_sky(10.0), None));
+        assert!(plain < 2.0, "{plain}");
+        let day: Vec<f32> = (0..100_000)
+            .map(|i| 90.0 + noise(i) * 10.0 - noise(7 * i) * 90.0)
+            .collect();
+        let sky = middle(photograph(&day, Some(SKY_LEVELS)));
+        assert!((60.0..110.0).contains(&sky), "{sky}");
     }
 }

@@ -1,7 +1,8 @@
-//! Places names, brightest stars first, where they cover neither another name nor a bright star.
+//! Places names, brightest stars first, where they cover neither another name nor what is marked.
 
 use super::canvas::text_width;
 use super::mark::Mark;
+use super::options::Rings;
 
 /// Size of the letters, in units of strokes.
 pub(super) const SIZE: f32 = 12.5;
@@ -9,8 +10,6 @@ pub(super) const SIZE: f32 = 12.5;
 const CAPITALS: f32 = 0.74;
 /// Space around a name.
 const MARGIN: f32 = 2.0;
-/// Number of the brightest detections whose rings are kept free.
-const KEPT_FREE: usize = 250;
 
 /// A name and the start of its baseline, in pixels.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,63 +40,87 @@ impl Mark {
     }
 }
 
-/// Places the names of `marks`, brightest first, on a picture of `image` pixels.
-pub(super) fn place(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Label> {
+/// Places the names of `marks`, brightest first, on a picture of `image` pixels; returns the marks that are
+/// shown with it.
+pub(super) fn place(
+    marks: &[Mark],
+    rings: Rings,
+    image: [f32; 2],
+    unit: f32,
+) -> (Vec<Mark>, Vec<Label>) {
+    let named = brightest_named(marks, image, unit);
+    let mut shown: Vec<Mark> = match rings {
+        Rings::None => Vec::new(),
+        Rings::Named if !named.is_empty() => named.clone(),
+        Rings::Named | Rings::All => marks.to_vec(),
+    };
+    let mut taken: Vec<Rectangle> = Vec::new();
+    let mut labels = Vec::new();
+    for mark in &named {
+        match label_of(mark, &shown, &taken, image, unit) {
+            Some((rectangle, label)) => {
+                taken.push(rectangle);
+                labels.push(label);
+            }
+            // What is marked has a name.
+            None if rings == Rings::Named => shown.retain(|other| other != mark),
+            None => {}
+        }
+    }
+    (shown, labels)
+}
+
+/// The marks with the brightest stars, brightest first: as many as there is room for names.
+fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Mark> {
+    /// Smallest area per name, in square units: more names are unreadable.
+    const AREA_PER_LABEL: f32 = 9000.0;
+    let v_mag = |mark: &Mark| {
+        mark.label
+            .as_ref()
+            .map_or(f32::INFINITY, |(_, v_mag)| *v_mag)
+    };
+    let mut named: Vec<Mark> = marks
+        .iter()
+        .filter(|mark| mark.label.is_some())
+        .cloned()
+        .collect();
+    named.sort_by(|a, b| v_mag(a).total_cmp(&v_mag(b)));
+    named.truncate((image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize);
+    named
+}
+
+/// The name of a mark, and the room that it takes, where there is any.
+fn label_of(
+    mark: &Mark,
+    shown: &[Mark],
+    taken: &[Rectangle],
+    image: [f32; 2],
+    unit: f32,
+) -> Option<(Rectangle, Label)> {
     /// Distance of a name from its ring, ...
     const GAP: f32 = 3.0;
     /// ... and where there is no room beside it, with a line to the ring.
     const FAR_GAP: f32 = 16.0;
-    /// Largest share of the rings that is kept free.
-    const KEPT_FREE_SHARE: f32 = 0.4;
-    /// Smallest area per name, in square units: more names are unreadable.
-    const AREA_PER_LABEL: f32 = 9000.0;
-    let mut named: Vec<(usize, &str, f32)> = marks
-        .iter()
-        .enumerate()
-        .filter_map(|(i, mark)| {
-            let (text, v_mag) = mark.label.as_ref()?;
-            Some((i, &**text, *v_mag))
-        })
-        .collect();
-    named.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let most = (image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize;
-    let kept_free = ((marks.len() as f32 * KEPT_FREE_SHARE) as usize).min(KEPT_FREE);
-    let mut taken: Vec<Rectangle> = Vec::new();
-    let mut labels = Vec::new();
-    for (index, text, _) in named {
-        if labels.len() == most {
-            break;
-        }
-        let is_free = |rectangle: &Rectangle| {
-            lies_within(rectangle, image)
-                && !taken.iter().any(|other| overlap(rectangle, other))
-                && !marks[..kept_free]
-                    .iter()
-                    .any(|mark| mark.is_covered_by(rectangle))
-        };
-        // Names may cross rings of faint stars, but as few as possible.
-        let crossed = |rectangle: &Rectangle| {
-            let others = marks[kept_free..].iter();
-            others.filter(|mark| mark.is_covered_by(rectangle)).count()
-        };
-        let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
-        let mark = &marks[index];
-        let find = |gap: f32| {
-            let candidates = candidates(mark, size, gap * unit, unit).into_iter();
-            candidates.filter(is_free).min_by_key(crossed)
-        };
-        let beside = find(GAP);
-        if let Some(rectangle) = beside.or_else(|| find(FAR_GAP)) {
-            taken.push(rectangle);
-            let margin = MARGIN * unit;
-            labels.push(Label {
-                text: text.to_owned(),
-                at: [rectangle[0] + margin, rectangle[3] - margin],
-                line: beside.is_none().then(|| mark.line_to(&rectangle)),
-            });
-        }
-    }
-    labels
+    let (text, _) = mark.label.as_ref()?;
+    let is_free = |rectangle: &Rectangle| {
+        lies_within(rectangle, image)
+            && !taken.iter().any(|other| overlap(rectangle, other))
+            && !shown.iter().any(|other| other.is_covered_by(rectangle))
+    };
+    let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
+    let find = |gap: f32| {
+        let mut candidates = candidates(mark, size, gap * unit, unit).into_iter();
+        candidates.find(is_free)
+    };
+    let beside = find(GAP);
+    let rectangle = beside.or_else(|| find(FAR_GAP))?;
+    let margin = MARGIN * unit;
+    let label = Label {
+        text: text.clone(),
+        at: [rectangle[0] + margin, rectangle[3] - margin],
+        line: beside.is_none().then(|| mark.line_to(&rectangle)),
+    };
+    Some((rectangle, label))
 }
 
 /// Positions around a ring, best first: beside it, at its corners, above and below.
@@ -173,8 +196,9 @@ mod tests {
                 mark(x, y, i as f32 * 0.01)
             })
             .collect();
-        let labels = place(&marks, IMAGE, 1.0);
+        let (shown, labels) = place(&marks, Rings::Named, IMAGE, 1.0);
         assert!(labels.len() > 15, "{}", labels.len());
+        assert_eq!(labels.len(), shown.len());
         assert!(labels.len() <= 54);
         for (i, label) in labels.iter().enumerate() {
             let own = rectangle(label);
@@ -184,7 +208,7 @@ mod tests {
                     .iter()
                     .all(|other| !overlap(&own, &rectangle(other)))
             );
-            let hidden = marks[..KEPT_FREE].iter().filter(|m| m.is_covered_by(&own));
+            let hidden = shown.iter().filter(|m| m.is_covered_by(&own));
             assert_eq!(hidden.count(), 0, "{label:?}");
         }
     }
@@ -198,7 +222,7 @@ mod tests {
             (798.0, 598.0),
             (400.0, 598.0),
         ] {
-            let labels = place(&[mark(x, y, 1.0)], IMAGE, 1.0);
+            let (_, labels) = place(&[mark(x, y, 1.0)], Rings::All, IMAGE, 1.0);
             assert_eq!(labels.len(), 1, "({x}, {y})");
             assert!(lies_within(&rectangle(&labels[0]), IMAGE));
         }
@@ -211,8 +235,11 @@ mod tests {
             mark(101.0, 100.0, 1.0),
             mark(102.0, 100.0, 3.0),
         ];
-        let labels = place(&crowded, IMAGE, 1.0);
+        let (_, labels) = place(&crowded, Rings::All, IMAGE, 1.0);
         assert_eq!(labels[0].text, "05140095 1.0");
-        assert_eq!(place(&[mark(5.0, 5.0, 1.0)], [20.0, 20.0], 1.0), []);
+        let (shown, labels) = place(&[mark(5.0, 5.0, 1.0)], Rings::Named, [20.0, 20.0], 1.0);
+        assert!(shown.is_empty() && labels.is_empty());
+        let (shown, labels) = place(&crowded, Rings::None, IMAGE, 1.0);
+        assert!(shown.is_empty() && !labels.is_empty());
     }
 }

@@ -137,7 +137,7 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
         if x + width > right {
             break;
         }
-        canvas.ring([x + ring, y - ring], ring, kind.stroke(), kind.color());
+        kind.draw(canvas, [x + ring, y - ring], ring);
         canvas.text(&text, [x + 3.0 * ring, y], LETTERS, kind.color());
         x += width + 12.0 * canvas.unit;
     }

@@ -1,6 +1,6 @@
 //! Detections as they are drawn.
 
-use super::canvas::Rgb;
+use super::canvas::{Canvas, Rgb};
 use super::grey::Grey;
 use super::names;
 use crate::pipeline::{Solution, Source};
@@ -18,20 +18,35 @@ pub(super) enum MarkKind {
 }
 
 impl MarkKind {
-    /// The colors also differ in brightness, for color-blind readers.
+    /// Forms differ, too, and these colors to color-blind readers.
     pub(super) fn color(self) -> Rgb {
         match self {
-            Self::Identified => Rgb([110, 240, 150]),
+            Self::Identified => Rgb([110, 205, 255]),
             Self::Unidentified => Rgb([255, 170, 60]),
-            Self::NotAStar => Rgb([205, 85, 95]),
+            Self::NotAStar => Rgb([200, 120, 190]),
         }
     }
 
-    pub(super) fn stroke(self) -> f32 {
+    /// Draws the form of this kind: a circle, a square or a cross.
+    pub(super) fn draw(self, canvas: &mut Canvas, at: [f32; 2], radius: f32) {
+        let [x, y] = at;
         match self {
-            Self::Identified => 1.3,
-            Self::Unidentified => 1.1,
-            Self::NotAStar => 0.8,
+            Self::Identified => canvas.ring(at, radius, 1.3, self.color()),
+            Self::Unidentified => {
+                let side = 0.8 * radius;
+                let (left, right, top, bottom) = (x - side, x + side, y - side, y + side);
+                let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
+                let square = [&corners[..], &corners[..1]].concat();
+                canvas.line(&square, 1.1, self.color());
+            }
+            Self::NotAStar => {
+                let side = 0.6 * radius;
+                let cross = [[1.0, 1.0], [1.0, -1.0]];
+                for [right, down] in cross.map(|ends| ends.map(|end| end * side)) {
+                    let ends = [[x - right, y - down], [x + right, y + down]];
+                    canvas.line(&ends, 0.9, self.color());
+                }
+            }
         }
     }
 }
@@ -45,6 +60,12 @@ pub(super) struct Mark {
     pub(super) kind: MarkKind,
     /// Label and V magnitude of an identified star.
     pub(super) label: Option<(String, f32)>,
+}
+
+impl Mark {
+    pub(super) fn draw(&self, canvas: &mut Canvas) {
+        self.kind.draw(canvas, [self.x, self.y], self.radius);
+    }
 }
 
 /// The marks of all detections, brightest first.

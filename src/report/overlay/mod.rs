@@ -3,11 +3,11 @@
 //! ([`Frame`], [`Solution`], [`Catalog`]) → [`RgbImage`]. Nothing is read or written, and equal
 //! input gives equal pictures.
 //!
-//! 1. The frame becomes grey levels: its background is subtracted, and an asinh stretch shows faint
-//!    stars without enlarging bright ones. Small frames are enlarged and large ones reduced, by
+//! 1. The frame becomes grey levels ([`Stretch`]). Small frames are enlarged and large ones reduced, by
 //!    whole factors.
-//! 2. Every detection gets a ring: identified, not identified, or not a star.
-//! 3. Names and V magnitudes are placed where there is room, brightest first.
+//! 2. Names and V magnitudes of the brightest stars are placed where there is room, brightest first. They
+//!    cover neither each other nor what is marked.
+//! 3. Detections are marked ([`Rings`]): a circle is identified, a square is not, a cross is not a star.
 //! 4. Where site and time are known: zenith, horizon and cardinal points.
 //! 5. A strip below the frame shows file, centre and field, the meaning of the rings, a scale bar,
 //!    and north and east at the frame's centre.
@@ -22,6 +22,7 @@ mod labels;
 mod legend;
 mod mark;
 mod names;
+mod options;
 
 #[doc(hidden)]
 pub use canvas::FONT;
@@ -35,6 +36,8 @@ use image::RgbImage;
 use mark::MarkKind;
 use std::io;
 
+pub use options::{OverlayOptions, Rings, Stretch};
+
 /// Draws `frame` with its detections, as PNG; `title` is its name. The file is marked as an overlay
 /// ([`is_overlay`](crate::frame::is_overlay)).
 ///
@@ -45,27 +48,34 @@ pub fn png(
     frame: &Frame,
     solution: &Solution,
     catalog: &Catalog,
+    options: &OverlayOptions,
 ) -> io::Result<Vec<u8>> {
-    to_png(&draw(title, frame, solution, catalog)).map_err(io::Error::other)
+    to_png(&draw(title, frame, solution, catalog, options)).map_err(io::Error::other)
 }
 
 /// Draws `frame` with its detections; `title` is its name.
 #[doc(hidden)]
-pub fn draw(title: &str, frame: &Frame, solution: &Solution, catalog: &Catalog) -> RgbImage {
-    let grey = Grey::of(frame, solution.background.as_ref());
+pub fn draw(
+    title: &str,
+    frame: &Frame,
+    solution: &Solution,
+    catalog: &Catalog,
+    options: &OverlayOptions,
+) -> RgbImage {
+    let grey = Grey::of(frame, solution.background.as_ref(), options.stretch);
     let marks = mark::marks(solution, catalog, &grey);
     let unit = grey.stroke_unit();
     let mut canvas = Canvas::new(&grey, legend::size(&grey, unit), unit);
-    for mark in marks.iter().rev() {
-        let color = mark.kind.color();
-        canvas.ring([mark.x, mark.y], mark.radius, mark.kind.stroke(), color);
+    let image = [grey.width as f32, grey.height as f32];
+    let (shown, labels) = labels::place(&marks, options.rings, image, unit);
+    for mark in shown.iter().rev() {
+        mark.draw(&mut canvas);
     }
     if let Some(found) = solution.outcome.identification() {
         horizon::draw(&mut canvas, &grey, found);
     }
-    let image = [grey.width as f32, grey.height as f32];
     let letters = MarkKind::Identified.color().lighter();
-    for label in labels::place(&marks, image, unit) {
+    for label in labels {
         if let Some(line) = label.line {
             canvas.line(&line, 0.8, letters);
         }

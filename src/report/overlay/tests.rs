@@ -98,11 +98,20 @@ fn count(picture: &RgbImage, color: Rgb, [x, y]: [u32; 2], reach: u32) -> usize 
         .count()
 }
 
+/// A picture with all detections marked.
+fn drawn(title: &str, frame: &Frame, solution: &Solution) -> RgbImage {
+    let options = OverlayOptions {
+        rings: Rings::All,
+        ..OverlayOptions::default()
+    };
+    draw(title, frame, solution, Catalog::built_in(), &options)
+}
+
 #[test]
-fn every_detection_has_a_ring_of_the_color_of_its_kind() {
+fn every_detection_is_marked_in_the_color_of_its_kind() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
-    let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
+    let picture = drawn("a.tif", &frame, &solution);
     for (kind, center) in [
         (MarkKind::Identified, [200, 300]),
         (MarkKind::Unidentified, [500, 400]),
@@ -114,7 +123,7 @@ fn every_detection_has_a_ring_of_the_color_of_its_kind() {
             MarkKind::NotAStar,
         ] {
             let drawn = count(&picture, other.color(), center, 8);
-            // A thin ring mixes its color with the sky's.
+            // A thin line mixes its color with the sky's.
             assert_eq!(
                 drawn >= 3,
                 other == kind,
@@ -131,7 +140,7 @@ fn every_detection_has_a_ring_of_the_color_of_its_kind() {
 fn a_frame_that_is_not_identified_is_drawn_as_well() {
     let frame = frame(WIDTH, HEIGHT);
     let solution = solution(WIDTH, HEIGHT, not_identified());
-    let picture = draw("a.tif", &frame, &solution, Catalog::built_in());
+    let picture = drawn("a.tif", &frame, &solution);
     assert!(count(&picture, MarkKind::Unidentified.color(), [200, 300], 8) > 3);
     assert_eq!(
         count(&picture, MarkKind::Identified.color(), [200, 300], 8),
@@ -145,12 +154,7 @@ fn frames_of_any_size_are_drawn() {
         for outcome in [not_identified(), identified(10.0, false)] {
             let solution = solution(width, height, outcome);
             let title = "a long name of a file, ".repeat(9);
-            let picture = draw(
-                &title,
-                &frame(width, height),
-                &solution,
-                Catalog::built_in(),
-            );
+            let picture = drawn(&title, &frame(width, height), &solution);
             assert!(picture.width() >= 460 && picture.height() > 76);
         }
     }
@@ -159,7 +163,7 @@ fn frames_of_any_size_are_drawn() {
         ..solution(100, 100, not_identified())
     };
     let black = Frame::new(100, 100, vec![0.0; 10_000]).unwrap();
-    draw("black", &black, &nothing, Catalog::built_in());
+    drawn("black", &black, &nothing);
 }
 
 #[test]
@@ -186,12 +190,7 @@ fn north_and_east_are_where_the_camera_sees_them() {
 #[test]
 fn a_picture_is_the_same_after_it_was_a_file() {
     let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
-    let picture = draw(
-        "a.tif",
-        &frame(WIDTH, HEIGHT),
-        &solution,
-        Catalog::built_in(),
-    );
+    let picture = drawn("a.tif", &frame(WIDTH, HEIGHT), &solution);
     let png = to_png(&picture).unwrap();
     assert_eq!(image::load_from_memory(&png).unwrap().to_rgb8(), picture);
 }

@@ -1,0 +1,136 @@
+//! One row a frame, for people, and a summary of all.
+
+use crate::cli::exit::Tally;
+use starpipe::base::format::counted;
+use starpipe::report::FrameReport;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Width of the frames' names, in columns.
+const NAME_WIDTH: usize = 24;
+
+/// The row of column names.
+pub(super) fn header() -> String {
+    let name = "frame";
+    format!(
+        "{name:<NAME_WIDTH$}{:>10}{:>9}{:>8}{:>9}{:>6}{:>6}{:>8}\n",
+        "RA (°)", "Dec (°)", "roll", "\u{2033}/px", "stars", "limit", "model"
+    )
+}
+
+/// The row of a frame.
+pub(super) fn row(report: &FrameReport) -> String {
+    let name = ending(&report.frame);
+    let (Some(attitude), Some(optics), Some(matched)) =
+        (&report.attitude, &report.optics, &report.matched)
+    else {
+        let reason = report.reason_code.unwrap_or_default();
+        return format!("{name:<NAME_WIDTH$} not identified: {reason}\n");
+    };
+    let limit = limit_of(report);
+    let predicted = report
+        .prediction
+        .as_ref()
+        .and_then(|found| found.limit50_vmag);
+    format!(
+        "{name:<NAME_WIDTH$}{:>10.4}{:>9.4}{:>8.2}{:>9.3}{:>6}{:>6}{:>8}\n",
+        attitude.ra_deg,
+        attitude.dec_deg,
+        attitude.up_pa_deg,
+        (1.0 / optics.focal_length_px).to_degrees() * 3600.0,
+        matched.matched,
+        or_dash(limit),
+        or_dash(predicted),
+    )
+}
+
+fn limit_of(report: &FrameReport) -> Option<f64> {
+    report.photometry.as_ref()?.limit50_vmag
+}
+
+/// The end of a name, in which names of frames differ.
+fn ending(name: &str) -> String {
+    let count = name.chars().count();
+    if count < NAME_WIDTH {
+        return name.to_owned();
+    }
+    let end: String = name.chars().skip(count + 2 - NAME_WIDTH).collect();
+    format!("…{end}")
+}
+
+fn or_dash(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"))
+}
+
+/// What a run found, in a few lines.
+pub(super) struct Summary {
+    start: Instant,
+    reasons: BTreeMap<&'static str, usize>,
+    limits_vmag: Vec<f64>,
+}
+
+impl Summary {
+    pub(super) fn new() -> Self {
+        Self {
+            start: Instant::now(),
+            reasons: BTreeMap::new(),
+            limits_vmag: Vec::new(),
+        }
+    }
+
+    pub(super) fn add(&mut self, report: &FrameReport) {
+        if let Some(code) = report.reason_code {
+            *self.reasons.entry(code).or_default() += 1;
+        }
+        self.limits_vmag.extend(limit_of(report));
+    }
+
+    /// The summary; times are those of a clock.
+    pub(super) fn text(&mut self, tally: &Tally) -> String {
+        let all = tally.identified + tally.not_identified + tally.failed;
+        let mut parts = vec![format!("{} identified", tally.identified)];
+        let reasons = self.reasons.iter();
+        parts.extend(reasons.map(|(code, count)| format!("{count} {code}")));
+        if tally.failed > 0 {
+            parts.push(format!("{} not read", tally.failed));
+        }
+        self.limits_vmag.sort_unstable_by(f64::total_cmp);
+        if let Some(median) = self.limits_vmag.get(self.limits_vmag.len() / 2) {
+            parts.push(format!("median limit V {median:.2}"));
+        }
+        let rate = all as f64 / self.start.elapsed().as_secs_f64().max(1e-9);
+        parts.push(format!("{rate:.3} a second"));
+        format!("\n{}: {}\n", counted(all, "frame"), parts.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_keep_their_end() {
+        assert_eq!(ending("night.tif"), "night.tif");
+        let long = ending("/data/2026-11-26/camera-3/frame-00017.tif");
+        assert_eq!(long.chars().count(), NAME_WIDTH - 1);
+        assert!(
+            long.starts_with('…') && long.ends_with("frame-00017.tif"),
+            "{long}"
+        );
+    }
+
+    #[test]
+    fn a_summary_counts_reasons() {
+        let tally = Tally {
+            identified: 7,
+            not_identified: 2,
+            failed: 1,
+        };
+        let mut summary = Summary::new();
+        summary.reasons.insert("no_match", 2);
+        summary.limits_vmag = vec![6.0, 8.0, 7.0];
+        let text = summary.text(&tally);
+        let expected = "\n10 frames: 7 identified, 2 no_match, 1 not read, median limit V 7.00, ";
+        assert!(text.starts_with(expected), "{text}");
+    }
+}
