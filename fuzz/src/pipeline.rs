@@ -8,7 +8,7 @@ use starpipe::photometry::comparison::ObservingSetup;
 use starpipe::pipeline::{
     CentroidList, CentroidListOptions, ListedCentroid, solve_centroids, solve_frame,
 };
-use starpipe::report::overlay;
+use starpipe::report::overlay::{self, OverlayOptions};
 use starpipe::{
     CameraModel, Context, Frame, FrameReport, IndexedCatalog, Interrupt, PixelPoint, ScalePrior,
     Site, Solution, TextOptions, UnitVector, Workspace,
@@ -85,7 +85,13 @@ pub fn pipeline(data: &[u8]) {
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     // The slowest part, and the one that depends least on the pixels.
     if header.knows(6) && header.knows(7) {
-        let picture = overlay::draw("fuzzed", &frame, solution, indexed.catalog());
+        let picture = overlay::draw(
+            "fuzzed",
+            &frame,
+            solution,
+            indexed.catalog(),
+            &OverlayOptions::default(),
+        );
         assert!(picture.width() > 0);
     }
 }
