@@ -139,14 +139,14 @@ impl Calibration {
         }
         frame.with_stored(|frame| self.apply_to_stored(frame))?;
         if let Some(mask) = &self.mask {
-            let black = mask.frame.pixels.values().map(|value| value <= 0.0);
-            for (pixel, _) in frame
+            for (pixel, mask) in frame
                 .values_mut()
                 .iter_mut()
-                .zip(black)
-                .filter(|(_, black)| *black)
+                .zip(mask.frame.pixels.values())
             {
-                *pixel = f32::NAN;
+                if mask <= 0.0 {
+                    *pixel = f32::NAN;
+                }
             }
         }
         if frame.values().iter().all(|pixel| pixel.is_nan()) {

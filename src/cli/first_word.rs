@@ -1,7 +1,6 @@
 //! The first word of the command line: a command, or frames for `process`.
 
-use super::command::Arguments;
-use clap::CommandFactory;
+use clap::Command;
 use clap::error::ErrorKind;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -36,12 +35,13 @@ enum FirstWord {
 /// A first word that is another name of a command.
 pub(crate) fn completed(
     words: impl Iterator<Item = OsString>,
+    program: &mut Command,
 ) -> Result<Vec<OsString>, clap::Error> {
     let mut words: Vec<OsString> = words.collect();
     let Some(first) = words.get(1) else {
         return Ok(words);
     };
-    match kind_of(first) {
+    match kind_of(first, program) {
         FirstWord::Command => {}
         FirstWord::Frame => words.insert(1, "process".into()),
         FirstWord::Synonym(command) => {
@@ -49,16 +49,15 @@ pub(crate) fn completed(
                 "there is no command '{}'; see 'starpipe {command} --help'",
                 first.display()
             );
-            return Err(Arguments::command().error(ErrorKind::InvalidSubcommand, message));
+            return Err(program.error(ErrorKind::InvalidSubcommand, message));
         }
     }
     Ok(words)
 }
 
-fn kind_of(word: &OsStr) -> FirstWord {
+fn kind_of(word: &OsStr, program: &Command) -> FirstWord {
     let text = word.to_string_lossy();
-    let command = Arguments::command();
-    let is_command = command.find_subcommand(&*text).is_some() || text == "help";
+    let is_command = program.find_subcommand(&*text).is_some() || text == "help";
     let is_of_program = ["-h", "--help", "-V", "--version"].contains(&&*text);
     if is_command || is_of_program {
         return FirstWord::Command;
@@ -76,17 +75,27 @@ fn kind_of(word: &OsStr) -> FirstWord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::command::Arguments;
+    use clap::CommandFactory;
 
     #[test]
     fn frames_and_their_options_are_processed() {
         for word in ["night.tif", "Cargo.toml", "src", "--fov", "-", "*.fits"] {
-            assert_eq!(kind_of(OsStr::new(word)), FirstWord::Frame, "{word}");
+            assert_eq!(
+                kind_of(OsStr::new(word), &Arguments::command()),
+                FirstWord::Frame,
+                "{word}"
+            );
         }
         for word in ["process", "help", "--version", "-h", "proces"] {
-            assert_eq!(kind_of(OsStr::new(word)), FirstWord::Command, "{word}");
+            assert_eq!(
+                kind_of(OsStr::new(word), &Arguments::command()),
+                FirstWord::Command,
+                "{word}"
+            );
         }
         let words = ["starpipe", "--fov", "20", "a.png"].map(OsString::from);
-        let completed = completed(words.into_iter()).unwrap();
+        let completed = completed(words.into_iter(), &mut Arguments::command()).unwrap();
         assert_eq!(completed[1], "process");
         assert_eq!(completed.len(), 5);
     }
@@ -94,14 +103,19 @@ mod tests {
     #[test]
     fn synonyms_point_to_commands() {
         for (word, command) in SYNONYMS {
-            assert_eq!(kind_of(OsStr::new(word)), FirstWord::Synonym(command));
+            assert_eq!(
+                kind_of(OsStr::new(word), &Arguments::command()),
+                FirstWord::Synonym(command)
+            );
             assert!(
                 Arguments::command().find_subcommand(command).is_some(),
                 "{command}"
             );
         }
         let words = ["starpipe", "solve"].map(OsString::from);
-        let error = completed(words.into_iter()).unwrap_err().to_string();
+        let error = completed(words.into_iter(), &mut Arguments::command())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("starpipe process --help"), "{error}");
     }
 }

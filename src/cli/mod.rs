@@ -46,8 +46,9 @@ use std::process::ExitCode;
 
 /// Runs the command that the command line names.
 pub(crate) fn run() -> ExitCode {
-    let words = first_word::completed(std::env::args_os()).unwrap_or_else(|error| error.exit());
-    let matches = Arguments::command().get_matches_from(words);
+    let mut program = Arguments::command();
+    let words = first_word::completed(std::env::args_os(), &mut program);
+    let matches = program.get_matches_from(words.unwrap_or_else(|error| error.exit()));
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     silence();
     let done = caught(|| run_command(arguments.command));

@@ -147,6 +147,7 @@ fn run(
     found.clear();
     let Workspace {
         saturation,
+        saturation_adu,
         background,
         search,
         measure,
@@ -160,10 +161,11 @@ fn run(
         return Ok(());
     }
     background.measure(&view, frame.step_adu, config.cell_px)?;
+    *saturation_adu = config.saturation_adu(frame, saturation);
     let input = SearchInput {
         view: &view,
         background,
-        saturation_adu: config.saturation_adu(frame, saturation),
+        saturation_adu: *saturation_adu,
         config,
         memory: CandidateMemory::beside(frame, *memory),
     };

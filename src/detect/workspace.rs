@@ -1,7 +1,6 @@
 //! Buffers of detection.
 
 use super::background::FrameBackground;
-use super::config::DetectConfig;
 use super::detection::Detections;
 use super::measure::MeasureBuffers;
 use super::search::FrameSearch;
@@ -14,6 +13,8 @@ use std::num::NonZeroUsize;
 #[derive(Debug, Clone)]
 pub struct Workspace {
     pub(super) saturation: SaturationFinder,
+    /// Level from which on pixels of the frame searched last are saturated.
+    pub(super) saturation_adu: f32,
     pub(crate) background: FrameBackground,
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
@@ -27,6 +28,7 @@ impl Workspace {
     pub fn new() -> Self {
         let empty = Self {
             saturation: SaturationFinder::default(),
+            saturation_adu: f32::INFINITY,
             background: FrameBackground::default(),
             search: FrameSearch::default(),
             measure: MeasureBuffers::default(),
@@ -75,14 +77,8 @@ impl Workspace {
         self.memory = memory;
     }
 
-    /// The part of the frame that shows the sky; `frame` is the one that was searched last, with these
-    /// options.
-    pub(crate) fn sky_area(
-        &mut self,
-        frame: &Frame,
-        config: &DetectConfig,
-        found: &Detections,
-    ) -> Option<SkyArea> {
+    /// The part of the frame that shows the sky; `frame` is the one that was searched last.
+    pub(crate) fn sky_area(&self, frame: &Frame, found: &Detections) -> Option<SkyArea> {
         /// What hides the sky bends the background by this share of its height at least.
         const MIN_BEND: f32 = 0.1;
         let has_gaps =
@@ -90,10 +86,9 @@ impl Workspace {
         if !self.background.mesh.has_edges(MIN_BEND) && !has_gaps() {
             return None;
         }
-        let saturation_adu = config.saturation_adu(frame, &mut self.saturation);
         let stars = found.sources.iter();
         let stars = stars.filter(|source| source.flags.is_star_like());
-        SkyArea::of_picture(frame, stars.map(|star| star.position), saturation_adu)
+        SkyArea::of_picture(frame, stars.map(|star| star.position), self.saturation_adu)
     }
 
     /// Whether so many bytes fit its memory beside `frame`.

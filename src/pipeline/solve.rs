@@ -296,7 +296,7 @@ impl StarSearch<'_, '_> {
             Err(DetectError::Interrupted(_)) => return Ok(None),
             detected => detected?,
         };
-        detections.sky_area = self.workspace.detect.sky_area(frame, config, &detections);
+        detections.sky_area = self.workspace.detect.sky_area(frame, &detections);
         let raw = self.prepared.raw();
         let restore = |mosaic| RawColor::restore(mosaic, raw, &mut detections);
         let mosaic = self.mosaic.map(restore);

@@ -2,6 +2,7 @@
 
 use crate::cli::exit::Tally;
 use starpipe::base::format::counted;
+use starpipe::base::statistics::median;
 use starpipe::report::FrameReport;
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -94,8 +95,8 @@ impl Summary {
         if tally.failed > 0 {
             parts.push(format!("{} not read", tally.failed));
         }
-        self.limits_vmag.sort_unstable_by(f64::total_cmp);
-        if let Some(median) = self.limits_vmag.get(self.limits_vmag.len() / 2) {
+        if !self.limits_vmag.is_empty() {
+            let median = median(&mut self.limits_vmag);
             parts.push(format!("median limit V {median:.2}"));
         }
         let rate = all as f64 / self.start.elapsed().as_secs_f64().max(1e-9);

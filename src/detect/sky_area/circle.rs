@@ -1,6 +1,7 @@
 //! The circle that the sky fills in a picture by an all-sky lens.
 
 use super::SkyArea;
+use super::levels::Cells;
 use super::regions::Cell;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
@@ -23,38 +24,33 @@ const MIN_CELLS: usize = 60;
 impl SkyArea {
     /// The circle that the sky fills, if its edge is one that the frame's corners lie outside of.
     pub(crate) fn circle(&self) -> Option<Circle> {
-        let rows = self.cells.len() / self.columns;
-        let is_dark = |cell: usize| self.cells[cell] == Cell::Dark;
-        let corners = [
-            0,
-            self.columns - 1,
-            self.cells.len() - self.columns,
-            self.cells.len() - 1,
-        ];
-        if !corners.iter().all(|corner| is_dark(*corner)) {
+        let Cells {
+            side_px,
+            columns,
+            rows,
+        } = self.cells;
+        let is_dark = |cell: usize| self.shown[cell] == Cell::Dark;
+        let count = self.shown.len();
+        let corners = [0, columns - 1, count - columns, count - 1];
+        if !corners.into_iter().all(is_dark) {
             return None;
         }
         let is_edge = |cell: &usize| {
-            let (x, y) = (cell % self.columns, cell / self.columns);
-            let is_inner = x > 0 && y > 0 && x + 1 < self.columns && y + 1 < rows;
+            let (x, y) = (cell % columns, cell / columns);
+            let is_inner = x > 0 && y > 0 && x + 1 < columns && y + 1 < rows;
             let around = [
                 cell.wrapping_sub(1),
                 cell + 1,
-                cell.wrapping_sub(self.columns),
-                cell + self.columns,
+                cell.wrapping_sub(columns),
+                cell + columns,
             ];
             is_inner && !is_dark(*cell) && around.iter().any(|next| is_dark(*next))
         };
-        let cell_px = self.cell_px as f64;
+        let cell_px = side_px as f64;
         let middle_px = |at: usize| (at as f64 + 0.5) * cell_px - 0.5;
-        let edge: Vec<PixelPoint> = (0..self.cells.len())
+        let edge: Vec<PixelPoint> = (0..count)
             .filter(is_edge)
-            .map(|cell| {
-                PixelPoint::new(
-                    middle_px(cell % self.columns),
-                    middle_px(cell / self.columns),
-                )
-            })
+            .map(|cell| PixelPoint::new(middle_px(cell % columns), middle_px(cell / columns)))
             .collect();
         let first = fit(&edge)?;
         // Trees make the circle smaller: what lies far inside does not count.
@@ -113,9 +109,12 @@ mod tests {
             }
         });
         SkyArea {
-            cell_px: 10,
-            columns: 64,
-            cells: cells.collect(),
+            cells: Cells {
+                side_px: 10,
+                columns: 64,
+                rows: 48,
+            },
+            shown: cells.collect(),
         }
     }
 

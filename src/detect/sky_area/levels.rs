@@ -10,22 +10,48 @@ const MIN_CELL_PX: usize = 4;
 /// Pixels along a side of a cell that are looked at.
 const SAMPLES: usize = 3;
 
+/// Square cells of a frame, row by row; what is at the right and at the bottom and fills no cell belongs to
+/// the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Cells {
+    pub side_px: usize,
+    pub columns: usize,
+    pub rows: usize,
+}
+
+impl Cells {
+    fn of(frame: &Frame) -> Self {
+        let longer_px = frame.width.max(frame.height);
+        let side_px = longer_px.div_ceil(CELLS).max(MIN_CELL_PX);
+        let [columns, rows] = [frame.width, frame.height].map(|side| (side / side_px).max(1));
+        Self {
+            side_px,
+            columns,
+            rows,
+        }
+    }
+
+    /// The cell at a place, or the one nearest to it.
+    pub fn at(&self, place: &PixelPoint) -> usize {
+        let cell =
+            |at: f64, cells: usize| ((at + 0.5).max(0.0) as usize / self.side_px).min(cells - 1);
+        cell(place.y, self.rows) * self.columns + cell(place.x, self.columns)
+    }
+}
+
 /// The brightness of a frame in cells: the medians of some of their pixels.
 pub(super) struct Levels {
-    pub cell_px: usize,
-    pub columns: usize,
+    pub cells: Cells,
     /// Row by row, in ADU; NaN where a cell has no value.
     pub adu: Vec<f32>,
     saturation_adu: f32,
 }
 
 impl Levels {
-    /// Measures the cells of a frame; what is at the right and at the bottom and fills no cell belongs to
-    /// the last.
+    /// Measures the cells of a frame.
     pub fn of(frame: &Frame, saturation_adu: f32) -> Self {
-        let longer_px = frame.width.max(frame.height);
-        let cell_px = longer_px.div_ceil(CELLS).max(MIN_CELL_PX);
-        let [columns, rows] = [frame.width, frame.height].map(|side| (side / cell_px).max(1));
+        let cells = Cells::of(frame);
+        let (cell_px, columns) = (cells.side_px, cells.columns);
         let mut samples = Vec::with_capacity(SAMPLES * SAMPLES);
         let mut median = |cell: usize| {
             let [x, y] = [cell % columns, cell / columns].map(|at| at * cell_px);
@@ -45,10 +71,9 @@ impl Levels {
                 false => *samples.select_nth_unstable_by(middle, f32::total_cmp).1,
             }
         };
-        let adu: Vec<f32> = (0..columns * rows).map(&mut median).collect();
+        let adu: Vec<f32> = (0..columns * cells.rows).map(&mut median).collect();
         Self {
-            cell_px,
-            columns,
+            cells,
             adu,
             saturation_adu,
         }
@@ -59,27 +84,23 @@ impl Levels {
         self.adu[cell] >= self.saturation_adu
     }
 
-    pub fn rows(&self) -> usize {
-        self.adu.len() / self.columns
-    }
-
     /// The cell so many steps away; `None` outside the frame.
     pub fn neighbor(&self, cell: usize, way: [isize; 2], steps: isize) -> Option<usize> {
         let along = |at: usize, way: isize, cells: usize| {
             let at = at.checked_add_signed(way * steps)?;
             (at < cells).then_some(at)
         };
-        let x = along(cell % self.columns, way[0], self.columns)?;
-        let y = along(cell / self.columns, way[1], self.rows())?;
-        Some(y * self.columns + x)
+        let Cells { columns, rows, .. } = self.cells;
+        let x = along(cell % columns, way[0], columns)?;
+        let y = along(cell / columns, way[1], rows)?;
+        Some(y * columns + x)
     }
 
     /// The number of stars in each cell.
     pub fn count(&self, stars: impl Iterator<Item = PixelPoint>) -> Vec<u32> {
         let mut counts = vec![0; self.adu.len()];
-        let cell = |at: f64, cells: usize| (at.max(0.0) as usize / self.cell_px).min(cells - 1);
-        for PixelPoint { x, y } in stars {
-            counts[cell(y, self.rows()) * self.columns + cell(x, self.columns)] += 1;
+        for place in stars {
+            counts[self.cells.at(&place)] += 1;
         }
         counts
     }

@@ -8,22 +8,22 @@ mod regions;
 use crate::base::coords::PixelPoint;
 use crate::frame::Frame;
 pub use circle::Circle;
-use levels::Levels;
+use levels::{Cells, Levels};
 use regions::Cell;
 use std::sync::Arc;
 
 /// The part of a frame that shows the sky, in cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkyArea {
-    cell_px: usize,
-    columns: usize,
-    /// Row by row.
-    cells: Arc<[Cell]>,
+    cells: Cells,
+    /// What each of them shows.
+    shown: Arc<[Cell]>,
 }
 
 impl SkyArea {
-    /// What a picture and the places of its stars tell: an area with a sharp edge that is darker than what is around it and has
-    /// few stars, and what is saturated or has no value, do not show the sky. `None` where all does.
+    /// What a picture and the places of its stars tell. An area with a sharp edge that is darker than what is
+    /// around it and has few stars does not show the sky, nor does what is saturated or has no value. `None`
+    /// where all does.
     pub(super) fn of_picture(
         frame: &Frame,
         stars: impl Iterator<Item = PixelPoint>,
@@ -31,36 +31,28 @@ impl SkyArea {
     ) -> Option<Self> {
         let levels = Levels::of(frame, saturation_adu);
         let stars = levels.count(stars);
-        let cells = regions::cells(&levels, &stars);
+        let shown = regions::cells(&levels, &stars);
         let is_hidden = |cell: &Cell| *cell != Cell::Sky;
-        cells.iter().any(is_hidden).then(|| Self {
-            cell_px: levels.cell_px,
-            columns: levels.columns,
-            cells: cells.into(),
+        shown.iter().any(is_hidden).then(|| Self {
+            cells: levels.cells,
+            shown: shown.into(),
         })
     }
 
     /// Whether the sky is seen at a place.
     pub fn shows(&self, place: &PixelPoint) -> bool {
-        self.cell_at(place) == Cell::Sky
+        self.shown[self.cells.at(place)] == Cell::Sky
     }
 
     /// Whether something dark is at a place: light there is not that of a star, but comes through leaves.
     pub(crate) fn is_dark(&self, place: &PixelPoint) -> bool {
-        self.cell_at(place) == Cell::Dark
-    }
-
-    fn cell_at(&self, place: &PixelPoint) -> Cell {
-        let rows = self.cells.len() / self.columns;
-        let cell =
-            |at: f64, cells: usize| ((at + 0.5).max(0.0) as usize / self.cell_px).min(cells - 1);
-        self.cells[cell(place.y, rows) * self.columns + cell(place.x, self.columns)]
+        self.shown[self.cells.at(place)] == Cell::Dark
     }
 
     /// The share of the frame that shows the sky.
     pub fn share(&self) -> f64 {
-        let seen = self.cells.iter().filter(|cell| **cell == Cell::Sky).count();
-        seen as f64 / self.cells.len() as f64
+        let seen = self.shown.iter().filter(|cell| **cell == Cell::Sky).count();
+        seen as f64 / self.shown.len() as f64
     }
 }
 
@@ -104,7 +96,7 @@ mod tests {
         let frame = frame.with_levels(1.0, Some(255.0));
         let (config, mut workspace) = (DetectConfig::default(), Workspace::new());
         let found = detect(&frame, &config, &mut workspace).unwrap();
-        workspace.sky_area(&frame, &config, &found)
+        workspace.sky_area(&frame, &found)
     }
 
     #[test]

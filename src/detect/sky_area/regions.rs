@@ -97,8 +97,8 @@ fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
 }
 
 fn image_of(levels: &Levels, is_inside: impl Fn(usize) -> bool) -> GrayImage {
-    let columns = levels.columns as u32;
-    GrayImage::from_fn(columns, levels.rows() as u32, |x, y| {
+    let [columns, rows] = [levels.cells.columns, levels.cells.rows].map(|cells| cells as u32);
+    GrayImage::from_fn(columns, rows, |x, y| {
         if is_inside((y * columns + x) as usize) {
             INSIDE
         } else {

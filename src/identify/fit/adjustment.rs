@@ -47,7 +47,7 @@ const MIN_SHARE: f64 = 0.01;
 const MAX_STEP: f64 = 0.5;
 /// What lenses are like: standard deviation of the terms about zero, in units of half the frame's
 /// diagonal. It only matters where the stars say nothing of a term, as of the axis of a narrow field.
-const USUAL_TERMS: [f64; LENS_TERMS] = [0.5, 0.5, 0.5, 3.0, 3.0, 0.05, 0.05, 0.1, 0.02];
+pub(super) const USUAL_TERMS: [f64; LENS_TERMS] = [0.5, 0.5, 0.5, 3.0, 3.0, 0.05, 0.05, 0.1, 0.02];
 /// The same of the radial terms and the decentring of a lens that is followed from a window: what any ideal
 /// projection needs beyond the equidistant one.
 const FOLLOWED_TERMS: [f64; LENS_TERMS] = [0.5, 0.2, 0.1, 3.0, 3.0, 0.005, 0.005, 0.1, 0.02];
@@ -384,17 +384,16 @@ impl<'a, const P: usize> Adjustment<'a, P> {
 
     /// Adds what lenses are like; returns how unusual the present one is.
     fn add_usual(&self, block: &mut SMatrix<f64, P, P>, vector: &mut SVector<f64, P>) -> f64 {
-        let axis_px = match self.prior {
-            Prior::Axis(axis_px) => Some(axis_px),
-            _ => None,
+        let (usual, axis_px) = match self.prior {
+            Prior::Axis(axis_px) => (&USUAL_TERMS, Some(axis_px)),
+            Prior::Followed => (&FOLLOWED_TERMS, None),
+            Prior::Usual | Prior::Known(..) => (&USUAL_TERMS, None),
         };
         let terms_px = &self.predictor.distortion.coefficients_px()[..P - POSE_PARAMETERS];
         let mut misfit = 0.0;
         for (term, known_px) in terms_px.iter().enumerate() {
-            let (expected_px, mut sigma_px) = usual_term_px(&self.predictor.camera, axis_px, term);
-            if matches!(self.prior, Prior::Followed) && !(AXIS..AXIS + 2).contains(&term) {
-                sigma_px = FOLLOWED_TERMS[term] * self.predictor.camera.radius_px();
-            }
+            let camera = &self.predictor.camera;
+            let (expected_px, sigma_px) = usual_term_px(camera, usual, axis_px, term);
             let parameter = POSE_PARAMETERS + term;
             block[(parameter, parameter)] += sigma_px.powi(-2);
             vector[parameter] += expected_px * sigma_px.powi(-2);
@@ -513,9 +512,10 @@ impl<'a, const P: usize> Adjustment<'a, P> {
     }
 }
 
-/// Mean and standard deviation of a term of lenses in general, in pixels; with the axis where it is known.
+/// Mean and standard deviation of a term of lenses like `usual`, in pixels; with the axis where it is known.
 pub(super) fn usual_term_px(
     camera: &CameraModel,
+    usual: &[f64; LENS_TERMS],
     axis_px: Option<[f64; 2]>,
     term: usize,
 ) -> (f64, f64) {
@@ -527,8 +527,8 @@ pub(super) fn usual_term_px(
         (Some(along), Some(axis_px)) => (axis_px[along], KNOWN_PX),
         (Some(_), None) if !camera.is_pinhole() => (0.0, USUAL_AXIS_OF_FISHEYE * radius_px),
         _ => {
-            let usual = USUAL_TERMS.get(term).unwrap_or(&USUAL_MONOMIAL);
-            (0.0, usual * radius_px)
+            let sigma = usual.get(term).unwrap_or(&USUAL_MONOMIAL);
+            (0.0, sigma * radius_px)
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The normal equations are sparse: the attitude of a frame meets the lens and no other attitude.
 //! Attitudes are eliminated frame by frame, and what is left are the equations of the lens.
 
-use super::adjustment::{MeasuredStar, Predictor, usual_term_px};
+use super::adjustment::{MeasuredStar, Predictor, USUAL_TERMS, usual_term_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{CameraModel, Distortion, DistortionModel};
 use nalgebra::{
@@ -216,7 +216,7 @@ impl Joint<'_> {
             .map_or(&[][..], Distortion::coefficients_px);
         let mut misfit = 0.0;
         for (term, present_px) in terms_px.iter().enumerate() {
-            let (expected_px, sigma_px) = usual_term_px(camera, self.axis_px, term);
+            let (expected_px, sigma_px) = usual_term_px(camera, &USUAL_TERMS, self.axis_px, term);
             matrix[(1 + term, 1 + term)] += sigma_px.powi(-2);
             vector[1 + term] += (expected_px - present_px) * sigma_px.powi(-2);
             misfit += ((present_px - expected_px) / sigma_px).powi(2);

@@ -3,7 +3,7 @@
 use super::image::ElectronImage;
 use super::poisson::poisson;
 use super::scene::Scene;
-use super::skyline::zenith_of;
+use super::skyline::{horizon_of, zenith_of};
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
 use crate::model::sensitivity::{Scenario, StarLight};
@@ -57,6 +57,15 @@ pub(super) fn moon_direction(scene: &Scene, camera: &CameraModel) -> Option<Unit
     Some(UnitVector::from_unit(vector))
 }
 
+/// V magnitude of the scene's Moon.
+///
+/// # Reference
+/// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (9).
+pub(super) fn moon_vmag(scene: &Scene) -> f64 {
+    let phase = scene.moon_phase_deg;
+    -12.73 + 0.026 * phase + 4e-9 * phase.powi(4)
+}
+
 /// The lights of a frame: the Moon, and lamps at or below the altitude of the skyline.
 pub(super) fn lights(
     (scenario, scene): (&Scenario, &Scene),
@@ -72,18 +81,16 @@ pub(super) fn lights(
             electrons: light.electrons(v_mag, None),
         })
     };
-    let phase = scene.moon_phase_deg;
-    let moon_mag = -12.73 + 0.026 * phase + 4e-9 * phase.powi(4);
-    let moon = moon_direction(scene, camera).and_then(|at| of(at, MOON_RADIUS_RAD, moon_mag));
-    let zenith = *zenith_of(scenario).as_vector();
-    let first = zenith.cross(&Vector3::x()).normalize();
-    let second = zenith.cross(&first);
+    let v_mag = moon_vmag(scene);
+    let moon = moon_direction(scene, camera).and_then(|at| of(at, MOON_RADIUS_RAD, v_mag));
+    let zenith = zenith_of(scenario);
+    let [first, second] = horizon_of(&zenith);
     let count = poisson(scene.lamps, &mut random) as usize;
     let lamp = |_| {
         let (sin, cos) = libm::sincos(random.random_range(0.0..TAU));
         let highest_deg = scene.skyline_deg.unwrap_or(0.0).max(0.1);
         let (up, along) = libm::sincos(random.random_range(0.0..highest_deg).to_radians());
-        let at = along * (cos * first + sin * second) + up * zenith;
+        let at = along * (cos * first + sin * second) + up * zenith.as_vector();
         of(UnitVector::from_unit(at), LAMP_RADIUS_RAD, scene.lamp_vmag)
     };
     let lamps: Vec<Light> = (0..count).filter_map(lamp).collect();

@@ -1,7 +1,7 @@
 //! Sky brightness in each pixel, and what skyline, clouds and lens let through.
 
 use super::image::ElectronImage;
-use super::lights::moon_direction;
+use super::lights::{moon_direction, moon_vmag};
 use super::scene::Scene;
 use super::skyline::Skyline;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
@@ -221,9 +221,9 @@ impl Moonlight {
             let airmass = airmass_krisciunas_schaefer(zenith_distance_deg.to_radians());
             libm::pow(transmission, airmass)
         };
-        let phase = scene.moon_phase_deg;
-        let moon_mag = 3.84 + 0.026 * phase + 4e-9 * phase.powi(4);
-        let moon = libm::pow(10.0, -0.4 * moon_mag) * through(scene.moon_zenith_distance_deg);
+        // Eq. (8) and (9) make eq. (20).
+        let moon = libm::pow(10.0, -0.4 * (moon_vmag(scene) + 16.57))
+            * through(scene.moon_zenith_distance_deg);
         let scattered = moon * (1.0 - through(conditions.zenith_distance_deg));
         let sky = 34.08 * libm::exp(20.7233 - 0.92104 * conditions.sky.mag_arcsec2());
         Some(Self {

@@ -24,6 +24,13 @@ pub(super) fn zenith_of(scenario: &Scenario) -> UnitVector<Camera> {
     UnitVector::from_unit(Vector3::new(0.0, -sin, cos))
 }
 
+/// Two directions of the horizon at a right angle.
+pub(super) fn horizon_of(zenith: &UnitVector<Camera>) -> [Vector3<f64>; 2] {
+    let zenith = zenith.as_vector();
+    let first = zenith.cross(&Vector3::x()).normalize();
+    [first, zenith.cross(&first)]
+}
+
 /// The pixels that show trees and houses.
 pub(super) struct Skyline {
     width: usize,
@@ -89,11 +96,7 @@ struct Outline {
 impl Outline {
     /// How far below it a direction lies, in degrees.
     fn depth_deg(&self, direction: &UnitVector<Camera>) -> f64 {
-        let zenith = self.zenith.as_vector();
-        // Any direction of the horizon may be the first.
-        let first = zenith.cross(&Vector3::x()).normalize();
-        let second = zenith.cross(&first);
-        let [x, y] = [first, second].map(|axis| axis.dot(direction.as_vector()));
+        let [x, y] = horizon_of(&self.zenith).map(|axis| axis.dot(direction.as_vector()));
         let azimuth_rad = libm::atan2(y, x);
         // The longest wave is the highest. The variances 1 / 2n² of all add up to π² / 12.
         let wave = |(n, phase): (usize, &f64)| {

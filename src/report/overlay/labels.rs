@@ -3,6 +3,7 @@
 use super::canvas::text_width;
 use super::mark::Mark;
 use super::options::Rings;
+use std::ptr;
 
 /// Size of the letters, in units of strokes.
 pub(super) const SIZE: f32 = 12.5;
@@ -47,23 +48,23 @@ pub(super) fn place(
     rings: Rings,
     image: [f32; 2],
     unit: f32,
-) -> (Vec<Mark>, Vec<Label>) {
+) -> (Vec<&Mark>, Vec<Label>) {
     let named = brightest_named(marks, image, unit);
-    let mut shown: Vec<Mark> = match rings {
+    let mut shown: Vec<&Mark> = match rings {
         Rings::None => Vec::new(),
         Rings::Named if !named.is_empty() => named.clone(),
-        Rings::Named | Rings::All => marks.to_vec(),
+        Rings::Named | Rings::All => marks.iter().collect(),
     };
     let mut taken: Vec<Rectangle> = Vec::new();
     let mut labels = Vec::new();
-    for mark in &named {
+    for mark in named {
         match label_of(mark, &shown, &taken, image, unit) {
             Some((rectangle, label)) => {
                 taken.push(rectangle);
                 labels.push(label);
             }
             // What is marked has a name.
-            None if rings == Rings::Named => shown.retain(|other| other != mark),
+            None if rings == Rings::Named => shown.retain(|other| !ptr::eq(*other, mark)),
             None => {}
         }
     }
@@ -71,7 +72,7 @@ pub(super) fn place(
 }
 
 /// The marks with the brightest stars, brightest first: as many as there is room for names.
-fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Mark> {
+fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<&Mark> {
     /// Smallest area per name, in square units: more names are unreadable.
     const AREA_PER_LABEL: f32 = 9000.0;
     let v_mag = |mark: &Mark| {
@@ -79,11 +80,8 @@ fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Mark> {
             .as_ref()
             .map_or(f32::INFINITY, |(_, v_mag)| *v_mag)
     };
-    let mut named: Vec<Mark> = marks
-        .iter()
-        .filter(|mark| mark.label.is_some())
-        .cloned()
-        .collect();
+    let named = marks.iter().filter(|mark| mark.label.is_some());
+    let mut named: Vec<&Mark> = named.collect();
     named.sort_by(|a, b| v_mag(a).total_cmp(&v_mag(b)));
     named.truncate((image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize);
     named
@@ -92,7 +90,7 @@ fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<Mark> {
 /// The name of a mark, and the room that it takes, where there is any.
 fn label_of(
     mark: &Mark,
-    shown: &[Mark],
+    shown: &[&Mark],
     taken: &[Rectangle],
     image: [f32; 2],
     unit: f32,
@@ -237,7 +235,8 @@ mod tests {
         ];
         let (_, labels) = place(&crowded, Rings::All, IMAGE, 1.0);
         assert_eq!(labels[0].text, "05140095 1.0");
-        let (shown, labels) = place(&[mark(5.0, 5.0, 1.0)], Rings::Named, [20.0, 20.0], 1.0);
+        let alone = [mark(5.0, 5.0, 1.0)];
+        let (shown, labels) = place(&alone, Rings::Named, [20.0, 20.0], 1.0);
         assert!(shown.is_empty() && labels.is_empty());
         let (shown, labels) = place(&crowded, Rings::None, IMAGE, 1.0);
         assert!(shown.is_empty() && !labels.is_empty());
