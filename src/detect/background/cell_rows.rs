@@ -16,6 +16,7 @@ pub(crate) struct CellRows<'a, T> {
     rows: Range<usize>,
     background: &'a mut [f32],
     sigma: &'a mut [f32],
+    slope_sigma: [&'a mut [f32]; 2],
     maxima: &'a mut [f32],
     outputs: &'a mut [T],
 }
@@ -28,6 +29,8 @@ pub(crate) struct CellRow<'a, T> {
     pub background: &'a mut [f32],
     /// The noise of each cell.
     pub sigma: &'a mut [f32],
+    /// The noise of each cell from slopes, along x and along y.
+    pub slope_sigma: [&'a mut [f32]; 2],
     /// The maxima of the blocks in its rows of pixels.
     pub maxima: &'a mut [f32],
     /// The row's further output.
@@ -43,6 +46,7 @@ impl<'a, T: Send> CellRows<'a, T> {
             rows: 0..mesh.grid.rows,
             background: &mut mesh.background,
             sigma: &mut mesh.sigma,
+            slope_sigma: mesh.slope_sigma.each_mut().map(Vec::as_mut_slice),
             maxima: &mut maxima.values,
             outputs,
         }
@@ -55,6 +59,9 @@ impl<'a, T: Send> CellRows<'a, T> {
         let pixel_rows = grid.rows_of(middle - 1).end - grid.rows_of(self.rows.start).start;
         let (background, background_rest) = self.background.split_at_mut(count * grid.columns);
         let (sigma, sigma_rest) = self.sigma.split_at_mut(count * grid.columns);
+        let [(along_x, along_x_rest), (along_y, along_y_rest)] = self
+            .slope_sigma
+            .map(|sigma| sigma.split_at_mut(count * grid.columns));
         let (maxima, maxima_rest) = self.maxima.split_at_mut(pixel_rows * blocks_per_row);
         let (outputs, outputs_rest) = self.outputs.split_at_mut(count);
         let first = Self {
@@ -63,6 +70,7 @@ impl<'a, T: Send> CellRows<'a, T> {
             rows: self.rows.start..middle,
             background,
             sigma,
+            slope_sigma: [along_x, along_y],
             maxima,
             outputs,
         };
@@ -72,6 +80,7 @@ impl<'a, T: Send> CellRows<'a, T> {
             rows: middle..self.rows.end,
             background: background_rest,
             sigma: sigma_rest,
+            slope_sigma: [along_x_rest, along_y_rest],
             maxima: maxima_rest,
             outputs: outputs_rest,
         };
@@ -101,9 +110,13 @@ impl<'a, T: Send> CellRows<'a, T> {
         let columns = self.grid.columns;
         let backgrounds = self.background.chunks_mut(columns);
         let sigmas = self.sigma.chunks_mut(columns);
+        let [along_x, along_y] = self.slope_sigma.map(|sigma| sigma.chunks_mut(columns));
         let mut maxima = self.maxima;
-        let cells = backgrounds.zip(sigmas).zip(self.outputs);
-        for (row, ((background, sigma), output)) in self.rows.zip(cells) {
+        let cells = backgrounds
+            .zip(sigmas)
+            .zip(along_x.zip(along_y))
+            .zip(self.outputs);
+        for (row, (((background, sigma), (along_x, along_y)), output)) in self.rows.zip(cells) {
             let rows = self.grid.rows_of(row);
             let (of_row, rest) = maxima.split_at_mut(rows.len() * self.blocks_per_row);
             maxima = rest;
@@ -111,6 +124,7 @@ impl<'a, T: Send> CellRows<'a, T> {
                 rows,
                 background,
                 sigma,
+                slope_sigma: [along_x, along_y],
                 maxima: of_row,
                 output,
             });

@@ -65,6 +65,44 @@ impl CellMeasurer {
     }
 }
 
+/// Measures the noise of a row of cells of the filtered frame again, from differences of pixels
+/// [`DIFFERENCE_PX`] columns and rows apart: `sigma` of the pixels is a start, `rho` the correlation of white noise
+/// that far apart. NaN where a cell has too few values.
+///
+/// An error of a position is one of the slope of the filtered light, to which clouds and the Milky Way add
+/// less than to the light itself.
+pub(crate) fn measure_slopes(
+    grid: &CellGrid,
+    pixels: &SlopePixels<'_>,
+    rho: f32,
+    sigma: &[f32],
+    slope_sigma: [&mut [f32]; 2],
+) {
+    let white = (1.0 - rho).sqrt();
+    for (cell, &sigma) in sigma.iter().enumerate() {
+        let columns = grid.columns_of(cell);
+        let before = columns.start..columns.end.saturating_sub(DIFFERENCE_PX);
+        let after = columns.start + DIFFERENCE_PX..columns.end;
+        let measure = |rows, columns| {
+            let measured = sigma_of_differences(rows, columns, sigma * white, 0.0);
+            measured.map_or(f32::NAN, |sigma| sigma / white)
+        };
+        slope_sigma[0][cell] = measure([&pixels.rows; 2], [before, after]);
+        slope_sigma[1][cell] = measure([&pixels.above, &pixels.below], [columns.clone(), columns]);
+    }
+}
+
+/// Sampled rows of a row of cells, for differences.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SlopePixels<'a> {
+    /// The rows.
+    pub rows: PixelRows<'a>,
+    /// Those before some rows that have two neighbors, one for each.
+    pub above: PixelRows<'a>,
+    /// Those after these.
+    pub below: PixelRows<'a>,
+}
+
 /// Background and noise of a cell; `None` where it has too few values.
 fn measure_cell(
     rows: &PixelRows<'_>,
@@ -74,14 +112,17 @@ fn measure_cell(
 ) -> Option<Gaussian> {
     let pixels = CellSamples {
         rows: rows.columns(columns.clone()),
-        are_differences: false,
+        less: None,
     };
     let floor = config.sigma_floor;
     match config.sampled {
         Sampled::Filtered => clipped(&pixels, start, floor, FILTERED_TOLERANCE),
         Sampled::Pixels => {
             let cell = clipped(&pixels, start, floor, PIXEL_TOLERANCE)?;
-            let sigma = sigma_of_differences(rows, columns, cell.sigma, floor);
+            // The last differences of a cell reach into the next.
+            let later =
+                columns.start + DIFFERENCE_PX..(columns.end + DIFFERENCE_PX).min(rows.width);
+            let sigma = sigma_of_differences([rows, rows], [columns, later], cell.sigma, floor);
             Some(Gaussian {
                 sigma: sigma.unwrap_or(cell.sigma),
                 ..cell
@@ -90,22 +131,23 @@ fn measure_cell(
     }
 }
 
-/// The noise of a pixel from the differences between pixels, which gradients do not widen.
+/// The noise of a pixel from the differences between two sets of pixels, which gradients do not widen, if
+/// they were independent; `None` for too few.
 fn sigma_of_differences(
-    rows: &PixelRows<'_>,
-    columns: Range<usize>,
+    rows: [&PixelRows<'_>; 2],
+    columns: [Range<usize>; 2],
     start: f32,
     floor: f32,
 ) -> Option<f32> {
-    // The last differences of a cell reach into the next.
-    let columns = columns.start..(columns.end + DIFFERENCE_PX).min(rows.width);
-    let count = columns.len().saturating_sub(DIFFERENCE_PX) * rows.height;
-    if count < MIN_SAMPLES {
+    let width = columns[0].len().min(columns[1].len());
+    if width * rows[0].height < MIN_SAMPLES {
         return None;
     }
+    let [first, second] =
+        [0, 1].map(|i| rows[i].columns(columns[i].start..columns[i].start + width));
     let differences = CellSamples {
-        rows: rows.columns(columns),
-        are_differences: true,
+        rows: second,
+        less: Some(first),
     };
     let start = Gaussian {
         mean: 0.0,

@@ -16,7 +16,7 @@ const ERROR_LEFT_BY_ROUND: f32 = 0.11;
 const MAX_ROUNDS: usize = 8;
 /// Fewer samples than this have no mean.
 pub(crate) const MIN_SAMPLES: usize = 12;
-/// Distance of the two pixels of a difference, in columns.
+/// Distance of the two pixels of a difference.
 pub(crate) const DIFFERENCE_PX: usize = 2;
 /// Samples summed side by side.
 const LANES: usize = 32;
@@ -39,13 +39,13 @@ pub(crate) struct Tolerance {
     pub sigma: f32,
 }
 
-/// Samples of a cell: its pixels, or the differences of pixels [`DIFFERENCE_PX`] columns apart.
+/// Samples of a cell: its pixels, or what they are above others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CellSamples<'a> {
     /// The pixels.
     pub rows: PixelRows<'a>,
-    /// Whether the samples are differences.
-    pub are_differences: bool,
+    /// As many pixels that are taken from these.
+    pub less: Option<PixelRows<'a>>,
 }
 
 /// Mean and standard deviation without outliers, from a first estimate; `None` for too few samples.
@@ -96,26 +96,20 @@ fn clipped_moments(samples: &CellSamples<'_>, center: f32, half_width: f32) -> [
         sum[lane] += kept;
         squares[lane] += kept * kept;
     };
-    let CellSamples {
-        rows,
-        are_differences,
-    } = *samples;
+    let CellSamples { rows, less } = *samples;
     for y in 0..rows.height {
-        let row = rows.row(y);
-        if are_differences {
-            let (first, second) = (&row[..row.len() - DIFFERENCE_PX], &row[DIFFERENCE_PX..]);
-            let (chunks, rest) = first.as_chunks::<LANES>();
-            let (later_chunks, later_rest) = second.as_chunks::<LANES>();
-            for (chunk, later) in chunks.iter().zip(later_chunks) {
+        let (chunks, rest) = rows.row(y).as_chunks::<LANES>();
+        if let Some(less) = less {
+            let (other_chunks, other_rest) = less.row(y).as_chunks::<LANES>();
+            for (chunk, other) in chunks.iter().zip(other_chunks) {
                 for lane in 0..LANES {
-                    add(lane, later[lane] - chunk[lane]);
+                    add(lane, chunk[lane] - other[lane]);
                 }
             }
-            for (lane, (value, later)) in rest.iter().zip(later_rest).enumerate() {
-                add(lane, later - value);
+            for (lane, (value, other)) in rest.iter().zip(other_rest).enumerate() {
+                add(lane, value - other);
             }
         } else {
-            let (chunks, rest) = row.as_chunks::<LANES>();
             for chunk in chunks {
                 for (lane, value) in chunk.iter().enumerate() {
                     add(lane, *value);

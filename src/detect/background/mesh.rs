@@ -23,6 +23,9 @@ pub(crate) struct Mesh {
     pub background: Vec<f32>,
     /// Standard deviation of the noise; row-major, `rows * columns`.
     pub sigma: Vec<f32>,
+    /// Standard deviation of the noise from slopes, along x and along y, if it were white; row-major. Only of
+    /// filtered frames.
+    pub slope_sigma: [Vec<f32>; 2],
     /// Least noise that a cell could have.
     pub sigma_floor: f32,
     /// The columns at which the straight pieces of a row begin, and the end of the last one.
@@ -66,6 +69,26 @@ struct NodeLine {
     to: [f32; 2],
 }
 
+/// A point among the nodes: the node before it, and how far on it is, in nodes.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    row: usize,
+    column: usize,
+    across: f32,
+    down: f32,
+}
+
+impl Place {
+    /// The nearest place between nodes.
+    fn held(self) -> Self {
+        Self {
+            across: self.across.clamp(0.0, 1.0),
+            down: self.down.clamp(0.0, 1.0),
+            ..self
+        }
+    }
+}
+
 impl NodeLine {
     /// The heights of adjacent pixels, the first in column `x`, above the background, in units of
     /// the noise.
@@ -80,6 +103,13 @@ impl NodeLine {
             let sigma = from[1] + fraction.clamp(0.0, 1.0) * (to[1] - from[1]);
             *height = (value - background) / sigma;
         }
+    }
+}
+
+/// Raises noise to at least `floor`.
+fn raise(sigma: &mut [f32], floor: f32) {
+    for sigma in sigma {
+        *sigma = sigma.max(floor);
     }
 }
 
@@ -108,7 +138,8 @@ impl Mesh {
         self.columns_per_px = grid.columns as f32 / grid.width_px as f32;
         self.rows_per_px = grid.rows as f32 / grid.height_px as f32;
         self.sigma_floor = config.sigma_floor;
-        for map in [&mut self.background, &mut self.sigma] {
+        let [along_x, along_y] = &mut self.slope_sigma;
+        for map in [&mut self.background, &mut self.sigma, along_x, along_y] {
             map.clear();
             map.resize(grid.columns * grid.rows, f32::NAN);
         }
@@ -141,14 +172,24 @@ impl Mesh {
             grid,
             background,
             sigma,
+            slope_sigma,
             smoother,
             ..
         } = self;
         smoother.fill_gaps(grid, background, sigma);
         smoother.smooth(grid, background, sigma);
-        for sigma in sigma {
-            *sigma = sigma.max(self.sigma_floor);
+        for slopes in slope_sigma {
+            for (slope, sigma) in slopes
+                .iter_mut()
+                .zip(sigma.iter())
+                .filter(|(v, _)| v.is_nan())
+            {
+                *slope = *sigma;
+            }
+            smoother.smooth_noise(grid, slopes);
+            raise(slopes, self.sigma_floor);
         }
+        raise(sigma, self.sigma_floor);
         self.set_pieces();
     }
 
@@ -195,20 +236,48 @@ impl Mesh {
     /// extrapolated linearly and the noise is constant.
     #[inline]
     pub fn at(&self, x: f32, y: f32) -> (f32, f32) {
-        let (row, fy) = Self::node(y, self.rows_per_px, self.grid.rows);
-        let (column, fx) = Self::node(x, self.columns_per_px, self.grid.columns);
+        let place = self.place(x, y);
+        (
+            self.blend(&self.background, place),
+            self.blend(&self.sigma, place.held()),
+        )
+    }
+
+    /// The noise from slopes at column `x`, row `y`, along x and along y.
+    pub fn slope_sigma_at(&self, x: f32, y: f32) -> [f32; 2] {
+        let place = self.place(x, y).held();
+        self.slope_sigma
+            .each_ref()
+            .map(|map| self.blend(map, place))
+    }
+
+    #[inline]
+    fn place(&self, x: f32, y: f32) -> Place {
+        let (row, down) = Self::node(y, self.rows_per_px, self.grid.rows);
+        let (column, across) = Self::node(x, self.columns_per_px, self.grid.columns);
+        Place {
+            row,
+            column,
+            across,
+            down,
+        }
+    }
+
+    /// The value of a map at a place.
+    #[inline]
+    fn blend(&self, map: &[f32], place: Place) -> f32 {
+        let Place {
+            row,
+            column,
+            across,
+            down,
+        } = place;
         let right = (column + 1).min(self.grid.columns - 1);
         let below = (row + 1).min(self.grid.rows - 1);
-        let blend = |map: &[f32], fx: f32, fy: f32| {
-            let value = |r: usize, c: usize| map[r * self.grid.columns + c];
-            let top = value(row, column) + fx * (value(row, right) - value(row, column));
-            let bottom = value(below, column) + fx * (value(below, right) - value(below, column));
-            top + fy * (bottom - top)
-        };
-        (
-            blend(&self.background, fx, fy),
-            blend(&self.sigma, fx.clamp(0.0, 1.0), fy.clamp(0.0, 1.0)),
-        )
+        let value = |r: usize, c: usize| map[r * self.grid.columns + c];
+        let top = value(row, column) + across * (value(row, right) - value(row, column));
+        let bottom = value(below, column) + across * (value(below, right) - value(below, column));
+        top + down * (bottom - top)
     }
 
     /// Background and reciprocal noise along row `y`, as straight pieces between nodes.

@@ -22,8 +22,9 @@ mod mesh_config;
 mod smoothing;
 
 pub(crate) use cell_rows::CellRows;
-pub(crate) use cells::CellMeasurer;
+pub(crate) use cells::{CellMeasurer, SlopePixels, measure_slopes};
 pub(crate) use censored_noise::{CensoredNoise, MAX_DEPTH};
+pub(crate) use clipping::DIFFERENCE_PX;
 pub(crate) use cut_off::{CutOff, REACH_SIGMA};
 pub(crate) use frame_background::{FrameBackground, median, rounding_sigma_adu, sigma_floor};
 pub(crate) use mesh::{Mesh, Piece};

@@ -47,11 +47,23 @@ impl Smoother {
 
     /// Replaces each noise by the median of 3x3 cells, and the backgrounds that are outliers.
     pub fn smooth(&mut self, grid: &CellGrid, background: &mut [f32], sigma: &mut [f32]) {
+        self.smooth_noise(grid, sigma);
+        self.pad(grid, background);
+        let CellGrid { columns, rows, .. } = *grid;
+        let stride = columns + 2;
+        for row in 0..rows {
+            let cells = row * columns..(row + 1) * columns;
+            let around = [row, row + 1, row + 2]
+                .map(|r| &self.padded_background[r * stride..(r + 1) * stride]);
+            medians::replace_outliers(around, &sigma[cells.clone()], &mut background[cells]);
+        }
+    }
+
+    /// Replaces each noise by the median of 3x3 cells.
+    pub fn smooth_noise(&mut self, grid: &CellGrid, sigma: &mut [f32]) {
         let CellGrid { columns, rows, .. } = *grid;
         self.measured_sigma.clear();
         self.measured_sigma.extend_from_slice(sigma);
-        self.pad(grid, background);
-        let stride = columns + 2;
         for row in 0..rows {
             let cells = row * columns..(row + 1) * columns;
             if row > 0 && row + 1 < rows && columns > 2 {
@@ -62,13 +74,10 @@ impl Smoother {
                     sigma[cell] = self.median_at_border(grid, cell);
                 }
             } else {
-                for cell in cells.clone() {
+                for cell in cells {
                     sigma[cell] = self.median_at_border(grid, cell);
                 }
             }
-            let around = [row, row + 1, row + 2]
-                .map(|r| &self.padded_background[r * stride..(r + 1) * stride]);
-            medians::replace_outliers(around, &sigma[cells.clone()], &mut background[cells]);
         }
     }
 

@@ -7,7 +7,7 @@ use super::candidate_pixels::Candidates;
 use super::memory::check_count;
 use crate::base::interrupt::Interrupted;
 use crate::detect::DetectError;
-use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig};
+use crate::detect::background::{CellMeasurer, CellRows, Mesh, MeshConfig, measure_slopes};
 use crate::detect::filter::{FilteredBand, Kernel};
 use crate::detect::pixels::{BLOCK_PX, BlockMaxima, View};
 use std::ops::Range;
@@ -105,6 +105,8 @@ impl FilteredFrame {
             band.filter(view, background, kernel, filtered);
             let sampled = band.sampled(rows.clone(), grid.row_stride());
             cells.measure_row(&grid, sampled, &config, row.background, row.sigma);
+            let slopes = band.slope_pixels(&rows, grid.row_stride(), view.height);
+            measure_slopes(&grid, &slopes, kernel.slope_rho, row.sigma, row.slope_sigma);
             let cut = candidate_cut(row.background, row.sigma, gathered.threshold as f32);
             let most = gathered.most.saturating_sub(total.load(Ordering::Relaxed));
             cuts.clear();

@@ -2,7 +2,7 @@
 
 use super::convolution::{VECTOR_PX, normalise, sum_along_columns, sum_along_row};
 use super::kernel::Kernel;
-use crate::detect::background::{Mesh, Piece};
+use crate::detect::background::{Mesh, Piece, SlopePixels};
 use crate::detect::pixels::{Aligned, LINE, PixelRows, View};
 use crate::detect::psf::MAX_TAPS;
 use arrayvec::ArrayVec;
@@ -131,6 +131,17 @@ impl FilteredBand {
             stride: step * self.stride,
             width: self.width,
             height: rows.len().div_ceil(step),
+        }
+    }
+
+    /// Every `step`th of some rows of a frame of `height` rows, which the band holds with their neighbors, for
+    /// differences.
+    pub fn slope_pixels(&self, rows: &Range<usize>, step: usize, height: usize) -> SlopePixels<'_> {
+        let inner = rows.start.max(1)..rows.end.min(height.saturating_sub(1));
+        SlopePixels {
+            rows: self.sampled(rows.clone(), step),
+            above: self.sampled(inner.start - 1..inner.end.saturating_sub(1), step),
+            below: self.sampled(inner.start + 1..inner.end + 1, step),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The kernel of the matched filter: the spot along one axis, with unit norm.
 
+use crate::detect::background::DIFFERENCE_PX;
 use crate::detect::psf::{MAX_TAPS, PIXEL_VARIANCE_PX2, centered_profile};
 use arrayvec::ArrayVec;
 
@@ -16,6 +17,8 @@ pub(crate) struct Kernel {
     pub sum_of_squares: f64,
     /// Correlation of filtered white noise between adjacent pixels.
     pub rho: f64,
+    /// Correlation of filtered white noise between pixels that are compared for its slope.
+    pub slope_rho: f32,
 }
 
 impl Kernel {
@@ -39,6 +42,7 @@ impl Kernel {
                 .collect(),
             sum_of_squares: squares * squares,
             rho: autocorrelation(1) / squares,
+            slope_rho: (autocorrelation(DIFFERENCE_PX) / squares) as f32,
         }
     }
 

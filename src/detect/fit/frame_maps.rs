@@ -54,6 +54,13 @@ impl FrameMaps<'_> {
             .map_or(1.0, |mesh| f64::from(mesh.at(x as f32, y as f32).1))
     }
 
+    /// Errors of a spot's position over those in independent noise, along x and along y; 1 before the frame is
+    /// filtered.
+    pub fn position_correlation_at(&self, x: f64, y: f64) -> [f64; 2] {
+        let slopes = |mesh: &Mesh| mesh.slope_sigma_at(x as f32, y as f32).map(f64::from);
+        self.filtered.map_or([1.0; 2], slopes)
+    }
+
     /// The brightest pixel at a peak, and the light beside it.
     pub fn contrast_at(&self, peak: &Peak) -> Contrast {
         Contrast::near(&self.view, self.background, peak.x, peak.y)

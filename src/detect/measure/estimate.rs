@@ -64,9 +64,10 @@ fn best_estimate(
             from_filter(maps, peak, region),
         );
     }
+    let [along_x, along_y] = maps.position_correlation_at(spot.x, spot.y);
     let mut fitted = SpotEstimate {
-        sigma_x: spot.sigma_x * correlation,
-        sigma_y: spot.sigma_y * correlation,
+        sigma_x: spot.sigma_x * along_x,
+        sigma_y: spot.sigma_y * along_y,
         noise_flux: spot.noise_flux * correlation,
         ..spot
     };

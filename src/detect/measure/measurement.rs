@@ -330,9 +330,9 @@ impl Measurement<'_> {
             // The centre depends on the level by about the distance of the two.
             let uncertain_px = distance_px * PIXEL_VARIANCE_PX2.sqrt();
             // Not that of noise, for which errors are raised where it is correlated.
-            let correlation = self.maps.correlation_at(spot.x, spot.y);
-            let sigma_px = core.sigma_px.hypot(uncertain_px) / correlation;
-            (spot.sigma_x, spot.sigma_y) = (sigma_px, sigma_px);
+            let sigma_px = core.sigma_px.hypot(uncertain_px);
+            let correlation = self.maps.position_correlation_at(spot.x, spot.y);
+            [spot.sigma_x, spot.sigma_y] = correlation.map(|correlation| sigma_px / correlation);
         }
     }
 
