@@ -337,11 +337,15 @@ impl Refiner {
     /// The fit to the pairs, from `guess`.
     fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
         self.measure(problem, guess.excess_sigma_px);
-        let fit = match self.known_lens(problem.field).cloned() {
-            Some(lens) => self.fit_known_lens(&lens, guess.hypothesis),
+        let known_lens = self.known_lens(problem.field).cloned();
+        let mut fit = match &known_lens {
+            Some(lens) => self.fit_known_lens(lens, guess.hypothesis),
             None => self.fit_lens(guess),
         }?;
         let excess_sigma_px = self.excess_sigma_of(problem, fit.parameters);
+        if known_lens.is_none() && excess_sigma_px == 0.0 {
+            fit.covariance *= self.overstated(fit.parameters);
+        }
         for (pair, [x, y]) in self.pairs.iter_mut().zip(&self.residuals_px) {
             pair.residual_px = (x * x + y * y).sqrt();
         }
@@ -441,13 +445,38 @@ impl Refiner {
         self.agreement_radius_px().clamp(before_px / 4.0, before_px)
     }
 
+    /// The share of the stated squared errors that the residuals of the better measured half of the stars
+    /// leave; 1 where chance explains a lower one. The light of faint stars is in the noise that errors are
+    /// stated for, and disturbs few of the stars.
+    fn overstated(&self, parameters: usize) -> f64 {
+        /// Larger residuals are of wrong names, in errors.
+        const MOST_SIGMAS: f64 = 3.0;
+        let squares = &self.scratch.squares;
+        let count = squares.len().max(1) as f64;
+        let in_errors = |&(square, stated): &(f64, f64)| {
+            (0.5 * square / stated.max(1e-6)).min(MOST_SIGMAS.powi(2))
+        };
+        let mean = squares.iter().map(in_errors).sum::<f64>() / count;
+        let share = mean / self.free_share(parameters);
+        // The standard error of the mean of an exponential distribution is 1.
+        if share < 1.0 - EXCESS_SIGMAS / count.sqrt() {
+            share
+        } else {
+            1.0
+        }
+    }
+
+    /// Degrees of freedom over equations.
+    fn free_share(&self, parameters: usize) -> f64 {
+        let equations = 2.0 * self.pairs.len() as f64;
+        (equations - parameters as f64).max(1.0) / equations.max(1.0)
+    }
+
     /// The error in pixels that must be added in quadrature to the stated ones to explain the
     /// median residual; 0 where chance explains it. Only the better measured half of the stars
     /// counts: the faintest were detected because noise made them brighter, and it moved them, too.
     fn excess_sigma_of(&mut self, problem: Problem, parameters: usize) -> f64 {
-        let equations = 2.0 * self.pairs.len() as f64;
-        let free = (equations - parameters as f64).max(1.0) / equations.max(1.0);
-        let expected_sq = RAYLEIGH_MEDIAN.powi(2) * free;
+        let expected_sq = RAYLEIGH_MEDIAN.powi(2) * self.free_share(parameters);
         let stated_sq = |pair: &Pair| problem.field.stars[pair.observed].sigma_px.powi(2);
         let worst_sq = self.scratch.median(self.pairs.iter().map(stated_sq));
         let residuals = self.residuals_px.iter().zip(&self.pairs);
