@@ -8,7 +8,7 @@ use starpipe::photometry::comparison::ObservingSetup;
 use starpipe::pipeline::{
     CentroidList, CentroidListOptions, ListedCentroid, solve_centroids, solve_frame,
 };
-use starpipe::report::overlay::{self, OverlayOptions};
+use starpipe::report::overlay::{self, OverlayOptions, Shown};
 use starpipe::{
     CameraModel, Context, Frame, FrameReport, IndexedCatalog, Interrupt, PixelPoint, ScalePrior,
     Site, Solution, TextOptions, UnitVector, Workspace,
@@ -86,8 +86,7 @@ pub fn pipeline(data: &[u8]) {
     // The slowest part, and the one that depends least on the pixels.
     if header.knows(6) && header.knows(7) {
         let picture = overlay::draw(
-            "fuzzed",
-            &frame,
+            &Shown::new("fuzzed", &frame),
             solution,
             indexed.catalog(),
             &OverlayOptions::default(),

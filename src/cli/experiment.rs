@@ -10,7 +10,7 @@ use super::progress::frames_bar;
 use anyhow::Context;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
-use starpipe::report::overlay::{self, OverlayOptions};
+use starpipe::report::overlay::{self, OverlayOptions, Shown};
 use starpipe::study::experiment::{Published, Run, Trials, run};
 use std::path::{Path, PathBuf};
 
@@ -91,7 +91,12 @@ fn save_overlay(
     };
     let title = format!("{}, simulated", name.display());
     let options = OverlayOptions::default();
-    let picture = overlay::png(&title, frame, solution, indexed.catalog(), &options)?;
+    let picture = overlay::png(
+        &Shown::new(&title, frame),
+        solution,
+        indexed.catalog(),
+        &options,
+    )?;
     let path = output_path(directory, name, None, "png");
     write_whole(&[(path, picture)])
 }

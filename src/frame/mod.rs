@@ -29,6 +29,7 @@
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
 mod account;
+mod colors;
 mod columns;
 mod compressed;
 mod directory;
@@ -56,6 +57,7 @@ mod saturation;
 mod tiff;
 mod turning;
 
+pub use colors::Colors;
 #[doc(hidden)]
 pub use columns::DefectiveColumn;
 #[cfg(feature = "overlay")]

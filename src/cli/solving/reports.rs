@@ -73,6 +73,7 @@ pub(crate) fn report_all(
                     files,
                     needs_rows,
                     catalog: indexed.catalog(),
+                    memory: plan.memory,
                 },
             };
             solver.solve_all(paths, |images| run.take_all(images));
@@ -90,6 +91,7 @@ struct Reports<'a> {
     /// Whether rows of the table of frames are wanted.
     needs_rows: bool,
     catalog: &'a Catalog,
+    memory: MemoryLimit,
 }
 
 /// The report of an image, and whether its files could be written.
@@ -104,7 +106,9 @@ impl Sink for Reports<'_> {
 
     fn make(&self, image: &ImageName, solved: &Solved) -> Report {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
-        let saved = self.files.save(image, solved, &report, self.catalog);
+        let saved = self
+            .files
+            .save(image, solved, &report, self.catalog, self.memory);
         let row = self
             .needs_rows
             .then(|| FrameRow::new(&report, &solved.solution));

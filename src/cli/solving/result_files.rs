@@ -1,12 +1,13 @@
 //! Result files of an input, which `--out` asks for.
 
 use super::images::Solved;
+use crate::cli::input::stdin::is_stdin;
 use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
-use starpipe::frame::ImageName;
-use starpipe::report::overlay::{self, OverlayOptions};
+use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
+use starpipe::report::overlay::{self, OverlayOptions, Shown};
 use starpipe::report::{FrameReport, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 use std::path::PathBuf;
@@ -32,6 +33,7 @@ impl ResultFiles {
         solved: &Solved,
         report: &FrameReport,
         catalog: &Catalog,
+        memory: MemoryLimit,
     ) -> anyhow::Result<()> {
         let Some(directory) = &self.directory else {
             return Ok(());
@@ -46,7 +48,10 @@ impl ResultFiles {
             let name = image.to_path();
             let title = name.file_name().unwrap_or(name.as_os_str());
             let title = title.to_string_lossy();
-            let picture = overlay::png(&title, frame, &solved.solution, catalog, &self.overlay)?;
+            let colors = colors(image, frame, memory);
+            let mut shown = Shown::new(&title, frame);
+            shown.colors = colors.as_ref();
+            let picture = overlay::png(&shown, &solved.solution, catalog, &self.overlay)?;
             files.push((path("png"), picture));
         }
         let header = wcs::header(&report.frame, &solved.solution);
@@ -64,6 +69,16 @@ impl ResultFiles {
         }
         Ok(())
     }
+}
+
+/// The colors of an image, if it is the only one of a file.
+fn colors(image: &ImageName, frame: &Frame, memory: MemoryLimit) -> Option<Colors> {
+    if image.page.is_some() || is_stdin(image.path) {
+        return None;
+    }
+    let mut buffers = Buffers::new();
+    buffers.set_memory(memory);
+    Colors::read(image.path, frame, &mut buffers)
 }
 
 /// The stars of `report` as CSV.

@@ -1,6 +1,6 @@
 //! Draws strokes and letters on a picture.
 
-use super::grey::Grey;
+use super::picture::Picture;
 use crate::base::size::Size;
 use image::RgbImage;
 use std::sync::OnceLock;
@@ -52,7 +52,7 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// A canvas of `size` pixels with the frame in its upper left corner.
-    pub(super) fn new(grey: &Grey, size: Size, unit: f32) -> Self {
+    pub(super) fn new(picture: &Picture, size: Size, unit: f32) -> Self {
         let Size { width, height } = size;
         // A picture has at least one pixel, and far fewer than 2^31.
         let mut pixmap = Pixmap::new(width.max(1) as u32, height.max(1) as u32)
@@ -60,9 +60,9 @@ impl Canvas {
         let [r, g, b] = BACKDROP.0;
         pixmap.fill(tiny_skia::Color::from_rgba8(r, g, b, 255));
         let rows = pixmap.data_mut().chunks_mut(width * 4);
-        for (row, levels) in rows.zip(grey.levels.chunks(grey.width)) {
-            for (pixel, &level) in row.chunks_mut(4).zip(levels) {
-                pixel.copy_from_slice(&[level, level, level, 255]);
+        for (row, colors) in rows.zip(picture.pixels.chunks(picture.width)) {
+            for (pixel, &[r, g, b]) in row.chunks_mut(4).zip(colors) {
+                pixel.copy_from_slice(&[r, g, b, 255]);
             }
         }
         Self { pixmap, unit }

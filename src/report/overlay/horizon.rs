@@ -1,7 +1,7 @@
 //! Zenith, horizon and cardinal points, where site and time are known.
 
 use super::canvas::{Canvas, Rgb, text_width};
-use super::grey::Grey;
+use super::picture::Picture;
 use crate::base::units::RAD_PER_DEG;
 use crate::identify::Identification;
 
@@ -19,7 +19,7 @@ const STEP_DEG: u32 = 1;
 const LOWEST_DEG: std::ops::RangeInclusive<u32> = 1..=20;
 
 /// Draws what of them is in the frame.
-pub(super) fn draw(canvas: &mut Canvas, grey: &Grey, found: &Identification) {
+pub(super) fn draw(canvas: &mut Canvas, picture: &Picture, found: &Identification) {
     let place = |azimuth_deg: f64, altitude_deg: f64| {
         let [azimuth_rad, altitude_rad] = [azimuth_deg, altitude_deg].map(|deg| deg * RAD_PER_DEG);
         let apparent = found.places.in_horizon(azimuth_rad, altitude_rad)?;
@@ -29,7 +29,7 @@ pub(super) fn draw(canvas: &mut Canvas, grey: &Grey, found: &Identification) {
         found
             .camera
             .contains(&pixel)
-            .then(|| grey.position_of(&pixel))
+            .then(|| picture.position_of(&pixel))
     };
     let horizon: Vec<Option<[f32; 2]>> = (0..=360)
         .step_by(STEP_DEG as usize)

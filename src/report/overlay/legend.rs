@@ -1,8 +1,8 @@
 //! The strip below the frame: name, field, counts, scale bar and compass.
 
 use super::canvas::{Canvas, Rgb, text_width};
-use super::grey::Grey;
 use super::mark::{Mark, MarkKind};
+use super::picture::Picture;
 use crate::base::format::{counted, degrees, hours};
 use crate::base::size::Size;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
@@ -51,24 +51,24 @@ const LENGTHS: [(f64, &str); 20] = [
 ];
 
 /// Size of the whole picture, frame and strip.
-pub(super) fn size(grey: &Grey, unit: f32) -> Size {
+pub(super) fn size(picture: &Picture, unit: f32) -> Size {
     Size::new(
-        grey.width.max((MIN_WIDTH * unit) as usize),
-        grey.height + (HEIGHT * unit) as usize,
+        picture.width.max((MIN_WIDTH * unit) as usize),
+        picture.height + (HEIGHT * unit) as usize,
     )
 }
 
 /// Draws the strip.
 pub(super) fn draw(
     canvas: &mut Canvas,
-    grey: &Grey,
+    picture: &Picture,
     title: &str,
     solution: &Solution,
     marks: &[Mark],
 ) {
     /// Between the text and the scale bar.
     const GAP: f32 = 24.0;
-    let top = grey.height as f32;
+    let top = picture.height as f32;
     let mut right = canvas.width() - PADDING * canvas.unit;
     if let Some(found) = solution.outcome.identification() {
         right -= COMPASS * canvas.unit;
@@ -77,7 +77,7 @@ pub(super) fn draw(
             top + HEIGHT * canvas.unit / 2.0,
         ];
         draw_compass(canvas, centre, found);
-        right = draw_scale(canvas, grey, [right, top], found) - GAP * canvas.unit;
+        right = draw_scale(canvas, picture, [right, top], found) - GAP * canvas.unit;
     }
     let left = PADDING * canvas.unit;
     let lines = [title.to_owned(), field_line(solution)];
@@ -146,7 +146,7 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
 /// Draws a scale bar of a round length that ends at the right; returns where it begins.
 fn draw_scale(
     canvas: &mut Canvas,
-    grey: &Grey,
+    picture: &Picture,
     [right, top]: [f32; 2],
     found: &Identification,
 ) -> f32 {
@@ -154,8 +154,9 @@ fn draw_scale(
     const BAR: f32 = 150.0;
     const BAR_SHARE: f32 = 0.3;
     let most = (BAR * canvas.unit).min(BAR_SHARE * canvas.width());
-    let pixels =
-        |arcsec: f64| length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * grey.scale();
+    let pixels = |arcsec: f64| {
+        length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * picture.scale()
+    };
     let fits = |(arcsec, _): &&(f64, &str)| pixels(*arcsec) <= most;
     let Some((arcsec, name)) = LENGTHS.iter().find(fits) else {
         return right;

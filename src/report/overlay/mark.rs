@@ -1,8 +1,8 @@
 //! Detections as they are drawn.
 
 use super::canvas::{Canvas, Rgb};
-use super::grey::Grey;
 use super::names;
+use super::picture::Picture;
 use crate::pipeline::{Solution, Source};
 use crate::sky::catalog::Catalog;
 
@@ -69,7 +69,7 @@ impl Mark {
 }
 
 /// The marks of all detections, brightest first.
-pub(super) fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<Mark> {
+pub(super) fn marks(solution: &Solution, catalog: &Catalog, picture: &Picture) -> Vec<Mark> {
     let mut catalog_star = vec![None; solution.sources.len()];
     let identification = solution.outcome.identification();
     for star_match in identification.iter().flat_map(|found| &found.matches) {
@@ -77,11 +77,11 @@ pub(super) fn marks(solution: &Solution, catalog: &Catalog, grey: &Grey) -> Vec<
             *star = Some(star_match.star);
         }
     }
-    let rings = Rings::of(&solution.sources, grey);
+    let rings = Rings::of(&solution.sources, picture);
     let sources = solution.sources.iter().zip(catalog_star);
     sources
         .map(|(source, star)| {
-            let [x, y] = grey.position_of(&source.position);
+            let [x, y] = picture.position_of(&source.position);
             let label = star.map(|index| {
                 let v_mag = catalog.star(index).v_mag;
                 (names::label(catalog, index), v_mag)
@@ -116,7 +116,7 @@ struct Rings {
 
 impl Rings {
     /// The radii for `sources`, brightest first.
-    fn of(sources: &[Source], grey: &Grey) -> Self {
+    fn of(sources: &[Source], picture: &Picture) -> Self {
         /// Smallest radius in pixels of the frame: enlarged stars need larger rings.
         const MIN_RADIUS_PX: f32 = 3.0;
         /// In a crowd, the smallest ring is this share of the mean distance between stars, ...
@@ -126,16 +126,16 @@ impl Rings {
         /// Share of the detections that get larger rings than the smallest.
         const LARGER_RINGS: f64 = 0.8;
         let faintest_larger = (sources.len() as f64 * LARGER_RINGS) as usize;
-        let area = (grey.width * grey.height) as f32;
+        let area = (picture.width * picture.height) as f32;
         let spacing = (area / sources.len().max(1) as f32).sqrt();
-        let usual = (RADIUS.0 * grey.stroke_unit()).max(MIN_RADIUS_PX * grey.scale());
+        let usual = (RADIUS.0 * picture.stroke_unit()).max(MIN_RADIUS_PX * picture.scale());
         Self {
             flux: sources
                 .get(faintest_larger)
                 .and_then(|s| s.flux)
                 .unwrap_or(f64::NAN),
             smallest: usual * (SHARE_OF_SPACING * spacing / usual).clamp(MIN_SHARE, 1.0),
-            unit: grey.stroke_unit(),
+            unit: picture.stroke_unit(),
         }
     }
 

@@ -1,9 +1,9 @@
 //! What does the frame show? A picture of it with its stars ringed and named.
 //!
-//! ([`Frame`], [`Solution`], [`Catalog`]) → [`RgbImage`]. Nothing is read or written, and equal
+//! ([`Shown`], [`Solution`], [`Catalog`]) → [`RgbImage`]. Nothing is read or written, and equal
 //! input gives equal pictures.
 //!
-//! 1. The frame becomes grey levels ([`Stretch`]). Small frames are enlarged and large ones reduced, by
+//! 1. The frame becomes a picture, in its own colors where these are known ([`Stretch`]). Small frames are enlarged and large ones reduced, by
 //!    whole factors.
 //! 2. Names and V magnitudes of the brightest stars are placed where there is room, brightest first. They
 //!    cover neither each other nor what is marked.
@@ -16,63 +16,63 @@
 //! pixel (0, 0) lies half a pixel from the picture's corner.
 
 mod canvas;
-mod grey;
 mod horizon;
 mod labels;
 mod legend;
 mod mark;
 mod names;
 mod options;
+mod picture;
+mod shown;
 
 #[doc(hidden)]
 pub use canvas::FONT;
 
-use crate::frame::{Frame, OVERLAY_TEXT};
+use crate::frame::OVERLAY_TEXT;
 use crate::pipeline::Solution;
 use crate::sky::catalog::Catalog;
 use canvas::Canvas;
-use grey::Grey;
 use image::RgbImage;
 use mark::MarkKind;
+use picture::Picture;
 use std::io;
 
 pub use options::{OverlayOptions, Rings, Stretch};
+pub use shown::Shown;
 
-/// Draws `frame` with its detections, as PNG; `title` is its name. The file is marked as an overlay
+/// Draws a frame with its detections, as PNG. The file is marked as an overlay
 /// ([`is_overlay`](crate::frame::is_overlay)).
 ///
 /// # Errors
 /// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
 pub fn png(
-    title: &str,
-    frame: &Frame,
+    shown: &Shown<'_>,
     solution: &Solution,
     catalog: &Catalog,
     options: &OverlayOptions,
 ) -> io::Result<Vec<u8>> {
-    to_png(&draw(title, frame, solution, catalog, options)).map_err(io::Error::other)
+    to_png(&draw(shown, solution, catalog, options)).map_err(io::Error::other)
 }
 
-/// Draws `frame` with its detections; `title` is its name.
+/// Draws a frame with its detections.
 #[doc(hidden)]
 pub fn draw(
-    title: &str,
-    frame: &Frame,
+    shown: &Shown<'_>,
     solution: &Solution,
     catalog: &Catalog,
     options: &OverlayOptions,
 ) -> RgbImage {
-    let grey = Grey::of(frame, solution.background.as_ref(), options.stretch);
-    let marks = mark::marks(solution, catalog, &grey);
-    let unit = grey.stroke_unit();
-    let mut canvas = Canvas::new(&grey, legend::size(&grey, unit), unit);
-    let image = [grey.width as f32, grey.height as f32];
-    let (shown, labels) = labels::place(&marks, options.rings, image, unit);
-    for mark in shown.iter().rev() {
+    let picture = Picture::of(shown, solution.background.as_ref(), options.stretch);
+    let marks = mark::marks(solution, catalog, &picture);
+    let unit = picture.stroke_unit();
+    let mut canvas = Canvas::new(&picture, legend::size(&picture, unit), unit);
+    let image = [picture.width as f32, picture.height as f32];
+    let (marked, labels) = labels::place(&marks, options.rings, image, unit);
+    for mark in marked.iter().rev() {
         mark.draw(&mut canvas);
     }
     if let Some(found) = solution.outcome.identification() {
-        horizon::draw(&mut canvas, &grey, found);
+        horizon::draw(&mut canvas, &picture, found);
     }
     let letters = MarkKind::Identified.color().lighter();
     for label in labels {
@@ -81,7 +81,7 @@ pub fn draw(
         }
         canvas.text(&label.text, label.at, labels::SIZE, letters);
     }
-    legend::draw(&mut canvas, &grey, title, solution, &marks);
+    legend::draw(&mut canvas, &picture, shown.title, solution, &marks);
     canvas.into_image()
 }
 

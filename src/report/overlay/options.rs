@@ -4,13 +4,13 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct OverlayOptions {
-    /// How the frame becomes grey levels.
+    /// How the frame becomes a picture.
     pub stretch: Stretch,
     /// Which detections are marked.
     pub rings: Rings,
 }
 
-/// How a frame becomes grey levels.
+/// How a frame becomes a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Stretch {
@@ -19,7 +19,7 @@ pub enum Stretch {
     /// As a photograph: a dark sky is brightened to a fifth of white.
     #[default]
     Soft,
-    /// Without its background, from just below the sky to the level of bright stars: faint stars show.
+    /// In grey and without its background, from just below the sky to the level of bright stars: faint stars show.
     Hard,
 }
 

@@ -1,35 +1,37 @@
-//! The frame as grey levels.
+//! The frame as a picture.
 
 use super::options::Stretch;
+use super::shown::Shown;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::BackgroundMap;
-use crate::frame::Frame;
+use crate::frame::{Colors, Frame, LUMINANCE_WEIGHTS};
 use crate::pipeline::Background;
 
 /// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
 const SKY_LEVELS: [f32; 2] = [0.2, 0.35];
 
-/// The frame as a grey picture.
-pub(super) struct Grey {
+/// The frame as a picture.
+pub(super) struct Picture {
     /// Columns of the picture.
     pub(super) width: usize,
     /// Rows.
     pub(super) height: usize,
-    /// Row-major, `height * width`; 0 is black.
-    pub(super) levels: Vec<u8>,
+    /// Red, green and blue; row-major, `height * width`.
+    pub(super) pixels: Vec<[u8; 3]>,
     enlarged: usize,
     reduced: usize,
 }
 
-impl Grey {
+impl Picture {
     /// `frame`, stretched, enlarged or reduced by the smallest whole factor that gives a picture of
     /// suitable size.
-    pub(super) fn of(frame: &Frame, background: Option<&Background>, stretch: Stretch) -> Self {
+    pub(super) fn of(shown: &Shown<'_>, background: Option<&Background>, stretch: Stretch) -> Self {
         /// Frames with a shorter longest side are enlarged to at least this.
         const ENLARGE_BELOW_PX: usize = 800;
         /// Frames with a longer longest side are reduced to at most this.
         const REDUCE_ABOVE_PX: usize = 2500;
+        let frame = shown.frame;
         let longer = frame.width.max(frame.height);
         let enlarged = if longer < ENLARGE_BELOW_PX {
             ENLARGE_BELOW_PX.div_ceil(longer)
@@ -42,16 +44,21 @@ impl Grey {
             frame.height.div_ceil(reduced),
         );
         let size = Size::new(width, height);
-        let without_sky = stretch == Stretch::Hard;
-        let light = light(frame, reduced, size, without_sky);
-        // The mean of n² pixels has 1/n of the noise.
-        let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
-        let small = match stretch {
-            Stretch::None => photograph(&light, None),
-            Stretch::Soft => photograph(&light, Some(SKY_LEVELS)),
-            Stretch::Hard => greys(&light, noise),
+        let squares = Squares {
+            frame,
+            side: reduced,
+            size,
         };
-        let levels = if enlarged > 1 {
+        let small = match stretch {
+            Stretch::None => photograph(&squares, shown.colors, None),
+            Stretch::Soft => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
+            Stretch::Hard => {
+                // The mean of n² pixels has 1/n of the noise.
+                let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
+                grey(&above_sky(&squares, noise))
+            }
+        };
+        let pixels = if enlarged > 1 {
             enlarge(&small, width, enlarged)
         } else {
             small
@@ -59,7 +66,7 @@ impl Grey {
         Self {
             width: width * enlarged,
             height: height * enlarged,
-            levels,
+            pixels,
             enlarged,
             reduced,
         }
@@ -83,57 +90,145 @@ impl Grey {
     }
 }
 
-/// Light: means over squares of `side` pixels, NaN where there is no value; above the background, where
-/// that is wanted.
-fn light(frame: &Frame, side: usize, size: Size, without_sky: bool) -> Vec<f32> {
-    /// Background cells along the longer side: wide enough to keep the glow around bright stars.
-    const CELLS: usize = 16;
-    const MIN_CELL_PX: usize = 64;
-    let cell_px = (frame.width.max(frame.height) / CELLS).max(MIN_CELL_PX);
-    let background = without_sky.then(|| BackgroundMap::measure(frame, cell_px));
-    let pixels = frame.values();
-    let mut levels = vec![0.0; frame.width];
-    let mut light = Vec::with_capacity(size.pixels());
-    for rows in 0..size.height {
-        let mut sums = vec![(0.0_f32, 0_u32); size.width];
-        for y in rows * side..((rows + 1) * side).min(frame.height) {
-            if let Some(background) = &background {
-                background.row(y, &mut levels);
-            }
-            let row = &pixels[y * frame.width..(y + 1) * frame.width];
-            for (x, (pixel, level)) in row.iter().zip(&levels).enumerate() {
-                if !pixel.is_nan() {
-                    let sum = &mut sums[x / side];
-                    *sum = (sum.0 + pixel - level, sum.1 + 1);
-                }
-            }
-        }
-        light.extend(sums.iter().map(|(sum, count)| sum / *count as f32));
-    }
-    light
+/// The squares of pixels that the picture's pixels are.
+struct Squares<'a> {
+    frame: &'a Frame<'a>,
+    /// Pixels a side.
+    side: usize,
+    /// Squares in a row, and rows of them.
+    size: Size,
 }
 
-/// Converts light to grey: in proportion, or between the levels that nearly all pixels lie between, with the
-/// curve that brings the sky between these levels.
-fn photograph(light: &[f32], sky_levels: Option<[f32; 2]>) -> Vec<u8> {
-    /// Share of the pixels that are black, and that are white.
-    const BLACK_SHARE: f32 = 2e-3;
-    const WHITE_SHARE: f32 = 5e-4;
-    let shares = match sky_levels {
-        Some(_) => [1.0 - BLACK_SHARE, WHITE_SHARE],
-        None => [1.0, 0.0],
+impl Squares<'_> {
+    /// Means over the squares of what `fill` writes for a row of pixels; NaN where there is no value.
+    fn means(&self, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
+        let Self { frame, side, size } = *self;
+        let mut values = vec![0.0; frame.width];
+        let mut means = Vec::with_capacity(size.pixels());
+        for rows in 0..size.height {
+            let mut sums = vec![(0.0_f32, 0_u32); size.width];
+            for y in rows * side..((rows + 1) * side).min(frame.height) {
+                fill(y, &mut values);
+                for (x, value) in values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+                    let sum = &mut sums[x / side];
+                    *sum = (sum.0 + value, sum.1 + 1);
+                }
+            }
+            means.extend(sums.iter().map(|(sum, count)| sum / *count as f32));
+        }
+        means
+    }
+
+    /// Means of the frame.
+    fn light(&self) -> Vec<f32> {
+        let pixels = self.frame.values();
+        let width = self.frame.width;
+        self.means(|y, row| row.copy_from_slice(&pixels[y * width..(y + 1) * width]))
+    }
+
+    /// Means of the frame above its background.
+    fn light_above_sky(&self) -> Vec<f32> {
+        /// Background cells along the longer side: wide enough to keep the glow around bright stars.
+        const CELLS: usize = 16;
+        const MIN_CELL_PX: usize = 64;
+        let Frame { width, height, .. } = *self.frame;
+        let cell_px = (width.max(height) / CELLS).max(MIN_CELL_PX);
+        let background = BackgroundMap::measure(self.frame, cell_px);
+        let pixels = self.frame.values();
+        self.means(|y, row| {
+            background.row(y, row);
+            for (value, pixel) in row.iter_mut().zip(&pixels[y * width..]) {
+                *value = pixel - *value;
+            }
+        })
+    }
+
+    /// Means of each color.
+    fn colors(&self, colors: &Colors) -> [Vec<f32>; 3] {
+        let width = self.frame.width;
+        [0, 1, 2].map(|channel| {
+            self.means(|y, row| {
+                for (value, color) in row.iter_mut().zip(&colors.pixels[y * width..]) {
+                    *value = f32::from(color[channel]);
+                }
+            })
+        })
+    }
+}
+
+/// The frame in its own colors, or in grey: in proportion, or between the levels that nearly all pixels lie
+/// between, with the curve that brings the sky between `sky_levels`. All colors have the same curve.
+fn photograph(
+    squares: &Squares<'_>,
+    colors: Option<&Colors>,
+    sky_levels: Option<[f32; 2]>,
+) -> Vec<[u8; 3]> {
+    let Some(colors) = colors else {
+        let light = squares.light();
+        let curve = Curve::of(&light, sky_levels);
+        return grey(
+            &light
+                .iter()
+                .map(|level| curve.apply(*level))
+                .collect::<Vec<_>>(),
+        );
     };
-    let [black, white] = shares.map(|share| level_exceeded_by(light, share));
-    let range = (white - black).max(f32::MIN_POSITIVE);
-    let share = |level: f32| ((level - black) / range).clamp(0.0, 1.0);
-    let sky = share(level_exceeded_by(light, 0.5));
-    let middle = match sky_levels {
-        Some([dark, bright]) if sky > 0.0 && sky < 1.0 => midtones(sky.clamp(dark, bright), sky),
-        _ => 0.5,
+    let [red, green, blue] = squares.colors(colors);
+    let all = red.iter().zip(&green).zip(&blue);
+    let pixels: Vec<[f32; 3]> = all.map(|((r, g), b)| [*r, *g, *b]).collect();
+    let luminance = |pixel: &[f32; 3]| -> f32 {
+        let parts = pixel.iter().zip(LUMINANCE_WEIGHTS);
+        parts.map(|(level, weight)| level * weight).sum()
     };
-    // NaN is black, too.
-    let grey = |level: &f32| (255.0 * midtones(middle, share(*level))).round() as u8;
-    light.iter().map(grey).collect()
+    let light: Vec<f32> = pixels.iter().map(luminance).collect();
+    let curve = Curve::of(&light, sky_levels);
+    let color = |pixel: &[f32; 3]| pixel.map(|level| curve.apply(level));
+    pixels.iter().map(color).collect()
+}
+
+/// Grey levels as colors.
+fn grey(levels: &[u8]) -> Vec<[u8; 3]> {
+    levels.iter().map(|&level| [level; 3]).collect()
+}
+
+/// A curve from light to levels of a picture.
+struct Curve {
+    black: f32,
+    range: f32,
+    middle: f32,
+}
+
+impl Curve {
+    /// The curve for a picture with this light.
+    fn of(light: &[f32], sky_levels: Option<[f32; 2]>) -> Self {
+        /// Share of the pixels that are black, and that are white.
+        const BLACK_SHARE: f32 = 2e-3;
+        const WHITE_SHARE: f32 = 5e-4;
+        let shares = match sky_levels {
+            Some(_) => [1.0 - BLACK_SHARE, WHITE_SHARE],
+            None => [1.0, 0.0],
+        };
+        let [black, white] = shares.map(|share| level_exceeded_by(light, share));
+        let mut curve = Self {
+            black,
+            range: (white - black).max(f32::MIN_POSITIVE),
+            middle: 0.5,
+        };
+        let sky = curve.share(level_exceeded_by(light, 0.5));
+        if let Some([dark, bright]) = sky_levels.filter(|_| sky > 0.0 && sky < 1.0) {
+            curve.middle = midtones(sky.clamp(dark, bright), sky);
+        }
+        curve
+    }
+
+    fn share(&self, level: f32) -> f32 {
+        ((level - self.black) / self.range).clamp(0.0, 1.0)
+    }
+
+    /// The level of the picture; black for NaN.
+    fn apply(&self, level: f32) -> u8 {
+        (255.0 * midtones(self.middle, self.share(level))).round() as u8
+    }
 }
 
 /// The curve from 0 over (`middle`, ½) to 1.
@@ -144,12 +239,12 @@ fn midtones(middle: f32, x: f32) -> f32 {
     (middle - 1.0) * x / ((2.0 * middle - 1.0) * x - middle)
 }
 
-/// Converts light to grey with an asinh stretch, from just below the background to the level of
+/// Light above the sky as grey with an asinh stretch, from just below the background to the level of
 /// bright stars.
 ///
 /// # Reference
 /// Lupton, Gunn & Szalay 1999, AJ 118, 1406, for asinh.
-fn greys(light: &[f32], noise: f32) -> Vec<u8> {
+fn above_sky(squares: &Squares<'_>, noise: f32) -> Vec<u8> {
     /// Black is this many standard deviations of the noise below the background.
     const BLACK_SIGMA: f32 = 1.5;
     /// The stretch is linear up to this many standard deviations above black, then logarithmic.
@@ -160,7 +255,8 @@ fn greys(light: &[f32], noise: f32) -> Vec<u8> {
     const MIN_WHITE_SIGMA: f32 = 40.0;
     /// Entries of the table from level to grey.
     const STEPS: usize = 4096;
-    let bright = level_exceeded_by(light, WHITE_SHARE);
+    let light = squares.light_above_sky();
+    let bright = level_exceeded_by(&light, WHITE_SHARE);
     let brightest = light.iter().copied().fold(0.0, f32::max);
     // Without noise, as in a drawing, the range of the frame sets the scale.
     let noise = noise.max(brightest * 1e-3).max(f32::MIN_POSITIVE * 1e6);
@@ -199,12 +295,12 @@ fn level_exceeded_by(values: &[f32], share: f32) -> f32 {
 }
 
 /// Enlarges every pixel to a square of `factor` pixels a side.
-fn enlarge(levels: &[u8], width: usize, factor: usize) -> Vec<u8> {
-    let mut enlarged = Vec::with_capacity(levels.len() * factor * factor);
-    for row in levels.chunks(width) {
-        let wide: Vec<u8> = row
+fn enlarge(pixels: &[[u8; 3]], width: usize, factor: usize) -> Vec<[u8; 3]> {
+    let mut enlarged = Vec::with_capacity(pixels.len() * factor * factor);
+    for row in pixels.chunks(width) {
+        let wide: Vec<[u8; 3]> = row
             .iter()
-            .flat_map(|&level| std::iter::repeat_n(level, factor))
+            .flat_map(|&pixel| std::iter::repeat_n(pixel, factor))
             .collect();
         for _ in 0..factor {
             enlarged.extend_from_slice(&wide);
@@ -227,7 +323,7 @@ mod tests {
 
     #[test]
     fn small_frames_are_enlarged_and_large_ones_reduced_by_whole_factors() {
-        for (size, picture, scale) in [
+        for (size, expected, scale) in [
             ((640, 480), (1280, 960), 2.0),
             ((1024, 768), (1024, 768), 1.0),
             ((300, 799), (600, 1598), 2.0),
@@ -235,17 +331,20 @@ mod tests {
             ((2600, 100), (1300, 50), 0.5),
             ((5001, 3), (1667, 1), 1.0 / 3.0),
         ] {
-            let grey = Grey::of(&frame(size.0, size.1), None, Stretch::Soft);
-            assert_eq!((grey.width, grey.height), picture, "{size:?}");
-            assert_eq!(grey.levels.len(), grey.width * grey.height);
-            assert_eq!(grey.scale(), scale, "{size:?}");
+            let picture = Picture::of(&Shown::new("", &frame(size.0, size.1)), None, Stretch::Soft);
+            assert_eq!((picture.width, picture.height), expected, "{size:?}");
+            assert_eq!(picture.pixels.len(), picture.width * picture.height);
+            assert_eq!(picture.scale(), scale, "{size:?}");
         }
     }
 
     #[test]
     fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
-        let grey = Grey::of(&frame(400, 400), None, Stretch::None);
-        assert_eq!(grey.position_of(&PixelPoint::new(0.0, 399.0)), [1.0, 799.0]);
+        let picture = Picture::of(&Shown::new("", &frame(400, 400)), None, Stretch::None);
+        assert_eq!(
+            picture.position_of(&PixelPoint::new(0.0, 399.0)),
+            [1.0, 799.0]
+        );
     }
 
     #[test]
@@ -268,13 +367,16 @@ mod tests {
             noise_adu: 2.9,
             sky_share: 1.0,
         };
-        let grey = Grey::of(&frame, Some(&sky), Stretch::Hard);
-        assert_eq!(grey.levels[315 * width + 415], 255);
-        assert_eq!(grey.levels[5], 0);
+        let picture = Picture::of(&Shown::new("", &frame), Some(&sky), Stretch::Hard);
+        assert_eq!(picture.pixels[315 * width + 415], [255; 3]);
+        assert_eq!(picture.pixels[5], [0; 3]);
         let mean = |from: usize| {
             let column = |x: usize| (0..200).map(move |y| x + y * width);
             let indices = (from..from + 100).flat_map(column);
-            indices.map(|i| f32::from(grey.levels[i])).sum::<f32>() / 20_000.0
+            indices
+                .map(|i| f32::from(picture.pixels[i][1]))
+                .sum::<f32>()
+                / 20_000.0
         };
         let (left, right) = (mean(0), mean(width - 100));
         assert!((10.0..60.0).contains(&left), "{left}");
@@ -298,6 +400,10 @@ mod tests {
                 .sum::<f64>()
                 / 101.0
         };
+        let photograph = |light: &[f32], sky_levels| {
+            let curve = Curve::of(light, sky_levels);
+            light.iter().map(|level| curve.apply(*level)).collect()
+        };
         let dark = middle(photograph(&with_sky(10.0), Some(SKY_LEVELS)));
         assert!((40.0..60.0).contains(&dark), "{dark}");
         let plain = middle(photograph(&with_sky(10.0), None));
@@ -307,5 +413,26 @@ mod tests {
             .collect();
         let sky = middle(photograph(&day, Some(SKY_LEVELS)));
         assert!((60.0..110.0).contains(&sky), "{sky}");
+    }
+
+    #[test]
+    fn all_colors_have_the_curve_of_their_luminance() {
+        let (width, height) = (820, 30);
+        let frame = frame(width, height);
+        // An orange sky.
+        let level = |i: usize| 1000 + 40 * (i * 7919 % 101) as u16;
+        let pixels = (0..width * height).map(|i| [level(i) + 900, level(i) + 300, level(i)]);
+        let colors = Colors {
+            pixels: pixels.collect(),
+        };
+        let shown = Shown {
+            colors: Some(&colors),
+            ..Shown::new("", &frame)
+        };
+        let picture = Picture::of(&shown, None, Stretch::Soft);
+        let ordered = |[r, g, b]: &&[u8; 3]| r >= g && g >= b && r > b;
+        assert!(picture.pixels.iter().filter(ordered).count() > width * height * 9 / 10);
+        let grey = Picture::of(&shown, None, Stretch::Hard);
+        assert!(grey.pixels.iter().all(|[r, g, b]| r == g && g == b));
     }
 }

@@ -6,6 +6,7 @@ use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::CameraModel;
 use crate::detect::DetectionFlags;
+use crate::frame::Frame;
 use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
 use crate::pipeline::{Background, Measured, Outcome, Reason, Source};
 use crate::report::sample;
@@ -104,7 +105,12 @@ fn drawn(title: &str, frame: &Frame, solution: &Solution) -> RgbImage {
         rings: Rings::All,
         ..OverlayOptions::default()
     };
-    draw(title, frame, solution, Catalog::built_in(), &options)
+    draw(
+        &Shown::new(title, frame),
+        solution,
+        Catalog::built_in(),
+        &options,
+    )
 }
 
 #[test]
