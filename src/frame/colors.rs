@@ -16,10 +16,12 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult};
 
 /// The colors of a frame's pixels, in the order of its pixels.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Colors {
     /// Red, green and blue, row-major; 65535 is full scale.
     pub(crate) pixels: Vec<[u16; 3]>,
+    /// The step between two levels.
+    pub(crate) step: f32,
 }
 
 impl Colors {
@@ -37,6 +39,7 @@ impl Colors {
         let mut pixels = Cow::Owned(pixels);
         frame.metadata.orientation.turn(&mut pixels, size.width);
         Some(Self {
+            step: f32::from(step_of(&pixels)),
             pixels: pixels.into_owned(),
         })
     }
@@ -100,9 +103,21 @@ fn of_tiff(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
     Ok((pixels.len() == size.pixels()).then_some((size, pixels)))
 }
 
+/// Levels of eight bits on the scale of sixteen.
+const SCALE: u16 = u16::MAX / u8::MAX as u16;
+
+/// The step between two levels: that of eight bits, or 1.
+fn step_of(pixels: &[[u16; 3]]) -> u16 {
+    let has_eight_bits = |level: &u16| level.is_multiple_of(SCALE);
+    if pixels.iter().flatten().all(has_eight_bits) {
+        SCALE
+    } else {
+        1
+    }
+}
+
 /// Colors of eight bits on the scale of sixteen.
 fn wide(levels: &[u8]) -> Vec<[u16; 3]> {
-    const SCALE: u16 = u16::MAX / u8::MAX as u16;
     let (pixels, _) = levels.as_chunks::<3>();
     let wide = |pixel: &[u8; 3]| pixel.map(|level| SCALE * u16::from(level));
     pixels.iter().map(wide).collect()

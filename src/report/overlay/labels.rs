@@ -2,6 +2,7 @@
 
 use super::canvas::text_width;
 use super::mark::Mark;
+use super::names::StarLabel;
 use super::options::Rings;
 use std::ptr;
 
@@ -49,7 +50,7 @@ pub(super) fn place(
     image: [f32; 2],
     unit: f32,
 ) -> (Vec<&Mark>, Vec<Label>) {
-    let named = brightest_named(marks, image, unit);
+    let named = brightest_named(marks, rings, image, unit);
     let mut shown: Vec<&Mark> = match rings {
         Rings::None => Vec::new(),
         Rings::Named if !named.is_empty() => named.clone(),
@@ -71,17 +72,23 @@ pub(super) fn place(
     (shown, labels)
 }
 
-/// The marks with the brightest stars, brightest first: as many as there is room for names.
-fn brightest_named(marks: &[Mark], image: [f32; 2], unit: f32) -> Vec<&Mark> {
+/// The marks with the brightest stars, brightest first: as many as there is room for names. Stars with a
+/// number alone are among them where all are marked, or where few have a name.
+fn brightest_named(marks: &[Mark], rings: Rings, image: [f32; 2], unit: f32) -> Vec<&Mark> {
     /// Smallest area per name, in square units: more names are unreadable.
     const AREA_PER_LABEL: f32 = 9000.0;
+    /// Fewer names than this are few.
+    const ENOUGH_NAMES: usize = 5;
     let v_mag = |mark: &Mark| {
         mark.label
             .as_ref()
-            .map_or(f32::INFINITY, |(_, v_mag)| *v_mag)
+            .map_or(f32::INFINITY, |label| label.v_mag)
     };
-    let named = marks.iter().filter(|mark| mark.label.is_some());
-    let mut named: Vec<&Mark> = named.collect();
+    let has_name = |mark: &&Mark| mark.label.as_ref().is_some_and(|label| label.has_name);
+    let mut named: Vec<&Mark> = marks.iter().filter(|mark| mark.label.is_some()).collect();
+    if rings == Rings::Named && named.iter().filter(|mark| has_name(mark)).count() >= ENOUGH_NAMES {
+        named.retain(has_name);
+    }
     named.sort_by(|a, b| v_mag(a).total_cmp(&v_mag(b)));
     named.truncate((image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize);
     named
@@ -99,7 +106,7 @@ fn label_of(
     const GAP: f32 = 3.0;
     /// ... and where there is no room beside it, with a line to the ring.
     const FAR_GAP: f32 = 16.0;
-    let (text, _) = mark.label.as_ref()?;
+    let StarLabel { text, .. } = mark.label.as_ref()?;
     let is_free = |rectangle: &Rectangle| {
         lies_within(rectangle, image)
             && !taken.iter().any(|other| overlap(rectangle, other))
@@ -173,7 +180,11 @@ mod tests {
             y,
             radius: 6.0,
             kind: MarkKind::Identified,
-            label: Some((format!("05140095 {v_mag:.1}"), v_mag)),
+            label: Some(StarLabel {
+                text: format!("05140095 {v_mag:.1}"),
+                v_mag,
+                has_name: false,
+            }),
         }
     }
 

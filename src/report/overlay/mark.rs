@@ -1,7 +1,7 @@
 //! Detections as they are drawn.
 
 use super::canvas::{Canvas, Rgb};
-use super::names;
+use super::names::StarLabel;
 use super::picture::Picture;
 use crate::pipeline::{Solution, Source};
 use crate::sky::catalog::Catalog;
@@ -58,8 +58,8 @@ pub(super) struct Mark {
     pub(super) y: f32,
     pub(super) radius: f32,
     pub(super) kind: MarkKind,
-    /// Label and V magnitude of an identified star.
-    pub(super) label: Option<(String, f32)>,
+    /// That of an identified star.
+    pub(super) label: Option<StarLabel>,
 }
 
 impl Mark {
@@ -82,10 +82,7 @@ pub(super) fn marks(solution: &Solution, catalog: &Catalog, picture: &Picture) -
     sources
         .map(|(source, star)| {
             let [x, y] = picture.position_of(&source.position);
-            let label = star.map(|index| {
-                let v_mag = catalog.star(index).v_mag;
-                (names::label(catalog, index), v_mag)
-            });
+            let label = star.map(|index| StarLabel::of(catalog, index));
             Mark {
                 x,
                 y,

@@ -32,17 +32,37 @@ const GREEK: [(&str, char); 24] = [
 
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// The star's proper name, else its letter, else its number, and its V magnitude: `Sirius −1.4`, `α CMi
-/// 0.4`.
-pub(super) fn label(catalog: &Catalog, star: StarIndex) -> String {
-    let name = match (catalog.proper_name(star), catalog.name_of(star)) {
-        (Some(name), _) => name.to_owned(),
-        (None, Some(name)) => short(name),
-        (None, None) => number(&catalog.designation(star)).to_owned(),
-    };
-    let v_mag = format!("{:.1}", catalog.star(star).v_mag);
-    let v_mag = if v_mag == "-0.0" { "0.0" } else { &v_mag };
-    format!("{name} {}", v_mag.replace('-', "−"))
+/// What is written beside a star.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct StarLabel {
+    /// The star's proper name, else its letter, else its number, and its V magnitude: `Sirius −1.4`, `α CMi
+    /// 0.4`.
+    pub(super) text: String,
+    /// Its V magnitude.
+    pub(super) v_mag: f32,
+    /// Whether it has more than a number.
+    pub(super) has_name: bool,
+}
+
+impl StarLabel {
+    /// The label of a star.
+    pub(super) fn of(catalog: &Catalog, star: StarIndex) -> Self {
+        let name = match (catalog.proper_name(star), catalog.name_of(star)) {
+            (Some(name), _) => Some(name.to_owned()),
+            (None, Some(name)) => Some(short(name)),
+            (None, None) => None,
+        };
+        let has_name = name.is_some();
+        let name = name.unwrap_or_else(|| number(&catalog.designation(star)).to_owned());
+        let v_mag = catalog.star(star).v_mag;
+        let rounded = format!("{v_mag:.1}");
+        let rounded = if rounded == "-0.0" { "0.0" } else { &rounded };
+        Self {
+            text: format!("{name} {}", rounded.replace('-', "−")),
+            v_mag,
+            has_name,
+        }
+    }
 }
 
 /// A designation without its catalogue, which would be the same for all stars of the picture.
@@ -93,7 +113,10 @@ mod tests {
     #[test]
     fn the_brightest_star_is_called_by_its_name_and_the_faintest_by_its_number() {
         let catalog = Catalog::built_in();
-        assert_eq!(label(catalog, StarIndex::new(0)), "Sirius −1.4");
+        assert_eq!(
+            StarLabel::of(catalog, StarIndex::new(0)).text,
+            "Sirius −1.4"
+        );
         let is_lettered = |star: &StarIndex| {
             let letter = catalog
                 .name_of(*star)
@@ -101,11 +124,11 @@ mod tests {
             letter && catalog.proper_name(*star).is_none()
         };
         let lettered = (0..500).map(StarIndex::new).find(is_lettered).unwrap();
-        assert!(label(catalog, lettered).starts_with('γ'));
+        assert!(StarLabel::of(catalog, lettered).text.starts_with('γ'));
         let last = StarIndex::new(catalog.stars().len() - 1);
         let designation = catalog.designation(last);
         let (_, number) = designation.split_once(' ').unwrap();
-        assert!(label(catalog, last).starts_with(number));
+        assert!(StarLabel::of(catalog, last).text.starts_with(number));
     }
 
     #[test]

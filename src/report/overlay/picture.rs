@@ -165,7 +165,7 @@ fn photograph(
 ) -> Vec<[u8; 3]> {
     let Some(colors) = colors else {
         let light = squares.light();
-        let curve = Curve::of(&light, sky_levels);
+        let curve = Curve::of(&light, squares.frame.step_adu, sky_levels);
         return grey(
             &light
                 .iter()
@@ -181,7 +181,7 @@ fn photograph(
         parts.map(|(level, weight)| level * weight).sum()
     };
     let light: Vec<f32> = pixels.iter().map(luminance).collect();
-    let curve = Curve::of(&light, sky_levels);
+    let curve = Curve::of(&light, colors.step, sky_levels);
     let color = |pixel: &[f32; 3]| pixel.map(|level| curve.apply(level));
     pixels.iter().map(color).collect()
 }
@@ -200,7 +200,9 @@ struct Curve {
 
 impl Curve {
     /// The curve for a picture with this light.
-    fn of(light: &[f32], sky_levels: Option<[f32; 2]>) -> Self {
+    fn of(light: &[f32], step: f32, sky_levels: Option<[f32; 2]>) -> Self {
+        /// Most levels of the picture between two of the frame: more are seen as edges.
+        const MOST_LEVELS: f32 = 10.0;
         /// Share of the pixels that are black, and that are white.
         const BLACK_SHARE: f32 = 2e-3;
         const WHITE_SHARE: f32 = 5e-4;
@@ -216,7 +218,10 @@ impl Curve {
         };
         let sky = curve.share(level_exceeded_by(light, 0.5));
         if let Some([dark, bright]) = sky_levels.filter(|_| sky > 0.0 && sky < 1.0) {
-            curve.middle = midtones(sky.clamp(dark, bright), sky);
+            // The curve is steepest at black.
+            let steepest =
+                (MOST_LEVELS / 255.0 * curve.range / step.max(f32::MIN_POSITIVE)).max(1.0);
+            curve.middle = midtones(sky.clamp(dark, bright), sky).max(1.0 / (1.0 + steepest));
         }
         curve
     }
@@ -401,7 +406,7 @@ mod tests {
                 / 101.0
         };
         let photograph = |light: &[f32], sky_levels| {
-            let curve = Curve::of(light, sky_levels);
+            let curve = Curve::of(light, 0.0, sky_levels);
             light.iter().map(|level| curve.apply(*level)).collect()
         };
         let dark = middle(photograph(&with_sky(10.0), Some(SKY_LEVELS)));
@@ -424,6 +429,7 @@ mod tests {
         let pixels = (0..width * height).map(|i| [level(i) + 900, level(i) + 300, level(i)]);
         let colors = Colors {
             pixels: pixels.collect(),
+            step: 1.0,
         };
         let shown = Shown {
             colors: Some(&colors),
