@@ -4,7 +4,8 @@
 //!
 //! [`Track`](crate::track::Track) → [`TrackReport`] → JSON line or text
 //!
-//! [`overlay`] draws the frame with its stars; [`wcs`] writes its coordinates as a FITS header.
+//! [`overlay`] draws the frame with its stars, [`page`] shows it in a browser; [`wcs`] writes its coordinates as
+//! a FITS header.
 //!
 //! Conventions: [`crate::conventions`]. Numbers are rounded to their significant digits. A number
 //! that is not finite is `null` in JSON and an empty field in CSV. Fields may be added to the JSON;
@@ -17,6 +18,8 @@ mod frame_report;
 mod lens;
 #[cfg(feature = "overlay")]
 pub mod overlay;
+#[cfg(feature = "page")]
+pub mod page;
 mod prediction;
 mod reason;
 #[cfg(test)]

@@ -83,6 +83,10 @@ pub(super) struct OutputOptions {
     /// if the frame is identified) and, for frames, FRAME.png (the stars marked and named)
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+    /// With --out, also write FRAME.html: a page with the answer, the picture, figures and a table, to look at
+    /// in a browser
+    #[arg(long, requires = "out")]
+    pub(super) html: bool,
     /// How FRAME.png shows the frame
     #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
     stretch: StretchOption,

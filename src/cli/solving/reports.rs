@@ -60,7 +60,7 @@ pub(crate) fn report_all(
         },
         tally: Tally::default(),
     };
-    let files = ResultFiles::new(output.out.clone(), output.overlay())?;
+    let files = ResultFiles::new(&output)?;
     let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
         catalog.with_index(|pool, indexed| {

@@ -1,6 +1,7 @@
 //! Result files of an input, which `--out` asks for.
 
 use super::images::Solved;
+use super::options::OutputOptions;
 use crate::cli::input::stdin::is_stdin;
 use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
 use crate::cli::output::overwrite;
@@ -8,7 +9,7 @@ use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
-use starpipe::report::{FrameReport, wcs, write_table_header};
+use starpipe::report::{FrameReport, page, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 use std::path::PathBuf;
 
@@ -16,13 +17,20 @@ use std::path::PathBuf;
 pub(super) struct ResultFiles {
     directory: Option<PathBuf>,
     overlay: OverlayOptions,
+    /// Whether pages are wanted.
+    html: bool,
 }
 
 impl ResultFiles {
     /// Makes the directory, if one is given.
-    pub(super) fn new(directory: Option<PathBuf>, overlay: OverlayOptions) -> anyhow::Result<Self> {
+    pub(super) fn new(options: &OutputOptions) -> anyhow::Result<Self> {
+        let directory = options.out.clone();
         directory.as_deref().map(make_directory).transpose()?;
-        Ok(Self { directory, overlay })
+        Ok(Self {
+            directory,
+            overlay: options.overlay(),
+            html: options.html,
+        })
     }
 
     /// Writes the files of `image`, all or none, and removes the FITS header of an earlier run if
@@ -44,15 +52,23 @@ impl ResultFiles {
             (path("json"), json.into_bytes()),
             (path("csv"), table(report, true)?.into_bytes()),
         ];
-        if let Some(frame) = &solved.frame {
-            let name = image.to_path();
-            let title = name.file_name().unwrap_or(name.as_os_str());
-            let title = title.to_string_lossy();
-            let colors = colors(image, frame, memory);
+        let name = image.to_path();
+        let title = name.file_name().unwrap_or(name.as_os_str());
+        let title = title.to_string_lossy();
+        let frame = solved.frame.as_ref();
+        let colors = frame.and_then(|frame| colors(image, frame, memory));
+        let shown = frame.map(|frame| {
             let mut shown = Shown::new(&title, frame);
             shown.colors = colors.as_ref();
-            let picture = overlay::png(&shown, &solved.solution, catalog, &self.overlay)?;
+            shown
+        });
+        if let Some(shown) = &shown {
+            let picture = overlay::png(shown, &solved.solution, catalog, &self.overlay)?;
             files.push((path("png"), picture));
+        }
+        if self.html {
+            let page = page::html(report, &solved.solution, shown.as_ref(), &self.overlay)?;
+            files.push((path("html"), page.into_bytes()));
         }
         let header = wcs::header(&report.frame, &solved.solution);
         let has_header = header.is_some();

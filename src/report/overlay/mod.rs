@@ -85,6 +85,16 @@ pub fn draw(
     canvas.into_image()
 }
 
+/// A frame without marks, at the size of its overlay.
+#[cfg(feature = "page")]
+pub(super) fn photograph(
+    shown: &Shown<'_>,
+    solution: &Solution,
+    options: &OverlayOptions,
+) -> RgbImage {
+    Picture::of(shown, solution.background.as_ref(), options.stretch).into_image()
+}
+
 /// Encodes the picture, fast rather than small.
 fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();

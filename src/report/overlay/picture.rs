@@ -7,6 +7,8 @@ use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::{Colors, Frame, LUMINANCE_WEIGHTS};
 use crate::pipeline::Background;
+#[cfg(feature = "page")]
+use image::RgbImage;
 
 /// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
 const SKY_LEVELS: [f32; 2] = [0.2, 0.35];
@@ -70,6 +72,14 @@ impl Picture {
             enlarged,
             reduced,
         }
+    }
+
+    /// The picture without marks.
+    #[cfg(feature = "page")]
+    pub(super) fn into_image(self) -> RgbImage {
+        let size = [self.width as u32, self.height as u32];
+        RgbImage::from_raw(size[0], size[1], self.pixels.into_flattened())
+            .expect("three bytes a pixel")
     }
 
     /// Pixels of the picture per pixel of the frame, along one axis.

@@ -1,0 +1,326 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const NS = "http://www.w3.org/2000/svg";
+  const byId = (id) => document.getElementById(id);
+  const make = (parent, tag, attributes = {}, text) => {
+    const node = document.createElementNS(NS, tag);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    if (text !== undefined) node.textContent = text;
+    parent.appendChild(node);
+    return node;
+  };
+  const { width, height, stars } = data;
+  const NOT_STARS = ["hot_pixel", "trail", "extended"];
+  stars.forEach((star, index) => {
+    star.index = index;
+    star.flags = star.flags || [];
+    const odd = star.flags.some((flag) => NOT_STARS.includes(flag));
+    star.kind = star.id ? "identified" : odd ? "other" : "unidentified";
+    star.residual = star.dx === undefined ? undefined : Math.hypot(star.dx, star.dy);
+  });
+
+  // The picture: the view box is what is seen of the frame, in its pixels.
+  const view = byId("view");
+  const layers = {};
+  for (const name of ["other", "unidentified", "identified", "residuals", "names"]) layers[name] = make(view, "g");
+  const box = { x: -0.5, y: -0.5, w: width, h: height };
+  const unit = () => box.w / Math.max(view.clientWidth, 1);
+  const radius = (star) => {
+    const above = star.flux > 0 ? 2.5 * Math.log10(star.flux / faintest) : 0;
+    return Math.min(4 + Math.max(above, 0), 13);
+  };
+  const fluxes = stars.map((star) => star.flux).filter((flux) => flux > 0).sort((a, b) => a - b);
+  const faintest = fluxes.length ? fluxes[Math.floor(fluxes.length * 0.2)] : 1;
+  const residuals = stars.map((star) => star.residual).filter((r) => r !== undefined).sort((a, b) => a - b);
+  const typical = residuals.length ? Math.max(residuals[Math.floor(residuals.length / 2)], 1e-3) : 1;
+  for (const star of stars) {
+    const tag = star.kind === "identified" ? "circle" : star.kind === "other" ? "path" : "rect";
+    star.shape = make(layers[star.kind], tag, { class: `shape ${star.kind}` });
+    star.shape.star = star;
+    if (star.residual !== undefined) star.arrow = make(layers.residuals, "path", { class: "arrow" });
+  }
+  const placeShapes = () => {
+    const u = unit();
+    for (const star of stars) {
+      const { x, y, shape } = star;
+      const r = radius(star) * u;
+      if (star.kind === "identified") {
+        shape.setAttribute("cx", x); shape.setAttribute("cy", y); shape.setAttribute("r", r);
+      } else if (star.kind === "other") {
+        shape.setAttribute("d", `M${x - r} ${y - r}l${2 * r} ${2 * r}m${-2 * r} 0l${2 * r} ${-2 * r}`);
+      } else {
+        shape.setAttribute("x", x - r); shape.setAttribute("y", y - r); shape.setAttribute("width", 2 * r); shape.setAttribute("height", 2 * r);
+      }
+      if (star.arrow) {
+        const k = 18 * u / typical, n = Math.max(star.residual, 1e-9), b = 4 * u / n;
+        const ex = x + star.dx * k, ey = y + star.dy * k;
+        star.arrow.setAttribute("d", `M${x} ${y}L${ex} ${ey}l${(-star.dx - star.dy * 0.6) * b} ${(-star.dy + star.dx * 0.6) * b}M${ex} ${ey}l${(-star.dx + star.dy * 0.6) * b} ${(-star.dy - star.dx * 0.6) * b}`);
+      }
+    }
+    placeNames(u);
+  };
+  // The brightest stars in view, where there is room.
+  const byMagnitude = stars.filter((star) => star.name || star.id).sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
+  const placeNames = (u) => {
+    const MOST = 60, SIZE = 12;
+    layers.names.replaceChildren();
+    const taken = [];
+    const shown = byMagnitude.filter((s) => s.x > box.x && s.x < box.x + box.w && s.y > box.y && s.y < box.y + box.h);
+    const named = shown.filter((star) => star.name);
+    for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
+      if (taken.length >= MOST) break;
+      const text = star.name || star.id;
+      const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
+      const room = [at[0], at[1] - SIZE * u, at[0] + text.length * SIZE * 0.6 * u, at[1] + 3 * u];
+      if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
+      taken.push(room);
+      make(layers.names, "text", { x: at[0], y: at[1], "font-size": SIZE * u, "stroke-width": 3 * u }, text);
+    }
+  };
+  let frame = 0;
+  const show = () => {
+    if (frame) return;
+    frame = requestAnimationFrame(() => {
+      frame = 0;
+      view.setAttribute("viewBox", `${box.x} ${box.y} ${box.w} ${box.h}`);
+      view.classList.toggle("sharp", unit() < 0.34);
+      placeShapes();
+    });
+  };
+  const zoom = (factor, x = box.x + box.w / 2, y = box.y + box.h / 2) => {
+    const w = Math.min(Math.max(box.w / factor, 8), width);
+    const share = w / box.w;
+    Object.assign(box, { x: x - (x - box.x) * share, y: y - (y - box.y) * share, w, h: box.h * share });
+    move(0, 0);
+  };
+  const move = (dx, dy) => {
+    box.x = Math.min(Math.max(box.x + dx, -0.5), width - 0.5 - box.w);
+    box.y = Math.min(Math.max(box.y + dy, -0.5), height - 0.5 - box.h);
+    show();
+  };
+  const whole = () => { Object.assign(box, { x: -0.5, y: -0.5, w: width, h: height }); show(); };
+  const pointOf = (event) => {
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(view.getScreenCTM().inverse());
+    return [point.x, point.y];
+  };
+  view.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(Math.exp(-event.deltaY / 400), ...pointOf(event));
+  }, { passive: false });
+  let grip = null;
+  view.addEventListener("pointerdown", (event) => { grip = [event.clientX, event.clientY]; });
+  view.addEventListener("pointermove", (event) => {
+    if (grip && event.buttons) {
+      move((grip[0] - event.clientX) * unit(), (grip[1] - event.clientY) * unit());
+      grip = [event.clientX, event.clientY];
+    } else if (event.target.star) {
+      tell(event.target.star);
+    }
+  });
+  view.addEventListener("click", (event) => { if (event.target.star) choose(event.target.star, false); });
+  view.addEventListener("keydown", (event) => {
+    const step = box.w / 8;
+    const keys = {
+      "+": () => zoom(1.5), "=": () => zoom(1.5), "-": () => zoom(1 / 1.5), "0": whole,
+      ArrowLeft: () => move(-step, 0), ArrowRight: () => move(step, 0), ArrowUp: () => move(0, -step), ArrowDown: () => move(0, step),
+    };
+    if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
+  });
+  for (const button of document.querySelectorAll("[data-zoom]")) {
+    const factor = Number(button.dataset.zoom);
+    button.addEventListener("click", () => (factor ? zoom(factor) : whole()));
+  }
+  for (const input of document.querySelectorAll("[data-layer]")) {
+    const layer = layers[input.dataset.layer] || byId("picture");
+    if (input.dataset.layer === "unidentified" && !stars.some((star) => star.id)) input.checked = true;
+    const apply = () => { if (layer) layer.style.display = input.checked ? "" : "none"; };
+    input.addEventListener("change", apply);
+    apply();
+  }
+
+  // One star: under the picture, in the picture and in the table.
+  const number = (value, decimals) => (value === undefined || value === null ? "" : value.toFixed(decimals));
+  const tell = (star) => {
+    const parts = [star.name || star.id || (star.kind === "other" ? "not a star" : "not identified")];
+    if (star.name && star.id) parts.push(star.id);
+    if (star.v !== undefined) parts.push(`V ${number(star.v, 2)}`);
+    if (star.ra !== undefined) parts.push(`RA ${number(star.ra, 4)}° Dec ${number(star.dec, 4)}°`);
+    parts.push(`x ${number(star.x, 2)} y ${number(star.y, 2)}`);
+    if (star.snr !== undefined) parts.push(`SNR ${star.snr}`);
+    if (star.residual !== undefined) parts.push(`residual ${number(star.residual, 3)} px`);
+    if (star.flags.length) parts.push(star.flags.join(" "));
+    byId("under").textContent = parts.join(" · ");
+  };
+  let chosen = null;
+  const choose = (star, center) => {
+    for (const node of chosen ? [chosen.shape, chosen.row] : []) node?.classList.remove("chosen");
+    chosen = star;
+    star.shape.classList.add("chosen");
+    star.row?.classList.add("chosen");
+    if (center) {
+      if (box.w > width / 4) zoom(box.w / (width / 4));
+      move(star.x - box.x - box.w / 2, star.y - box.y - box.h / 2);
+    } else {
+      star.row?.scrollIntoView({ block: "nearest" });
+    }
+    tell(star);
+  };
+
+  // The table: its rows are made as far as they are seen.
+  const COLUMNS = [
+    ["name", "Name", (s) => s.name || "", true], ["id", "Catalogue", (s) => s.id || "", true],
+    ["v", "V", (s) => number(s.v, 2)], ["snr", "SNR", (s) => (s.snr ?? "")], ["flux", "Flux", (s) => (s.flux ?? "")],
+    ["x", "x", (s) => number(s.x, 2)], ["y", "y", (s) => number(s.y, 2)],
+    ["ra", "RA (°)", (s) => number(s.ra, 4)], ["dec", "Dec (°)", (s) => number(s.dec, 4)],
+    ["residual", "Residual (px)", (s) => number(s.residual, 3)], ["flags", "Flags", (s) => s.flags.join(" "), true],
+  ];
+  const STEP = 200;
+  const rows = byId("rows");
+  let order = stars.slice(), made = 0, sorted = { key: null, up: true };
+  const more = () => {
+    for (const star of order.slice(made, made + STEP)) {
+      if (!star.row) {
+        star.row = document.createElement("tr");
+        star.row.tabIndex = 0;
+        for (const [, , text, isText] of COLUMNS) {
+          const cell = star.row.insertCell();
+          cell.textContent = text(star);
+          if (isText) cell.className = "text";
+        }
+        star.row.addEventListener("click", () => choose(star, true));
+        star.row.addEventListener("keydown", (event) => { if (event.key === "Enter") choose(star, true); });
+      }
+      rows.appendChild(star.row);
+    }
+    made = Math.min(made + STEP, order.length);
+  };
+  const scroll = rows.closest(".scroll");
+  scroll.addEventListener("scroll", () => {
+    if (made < order.length && scroll.scrollTop + scroll.clientHeight > scroll.scrollHeight - 600) more();
+  });
+  const comparison = /^\s*(v|snr|flux|x|y|ra|dec|residual)\s*([<>])\s*(-?[\d.]+)\s*$/i;
+  const fill = () => {
+    const asked = byId("filter").value;
+    const compared = asked.match(comparison);
+    const word = asked.trim().toLowerCase();
+    const fits = compared
+      ? (star) => {
+          const value = star[compared[1].toLowerCase()];
+          return value !== undefined && (compared[2] === "<" ? value < Number(compared[3]) : value > Number(compared[3]));
+        }
+      : (star) => `${star.name || ""} ${star.id || ""} ${star.flags.join(" ")} ${star.kind}`.toLowerCase().includes(word);
+    order = stars.filter(fits);
+    const { key, up } = sorted;
+    if (key) {
+      const rank = (star) => (key === "flags" ? star.flags.join(" ") || undefined : star[key]);
+      order.sort((a, b) => {
+        const [p, q] = [rank(a), rank(b)];
+        if (p === undefined || q === undefined) return (p === undefined) - (q === undefined);
+        return (p < q ? -1 : p > q ? 1 : 0) * (up ? 1 : -1);
+      });
+    }
+    const fitting = new Set(order);
+    for (const star of stars) star.shape.style.display = fitting.has(star) ? "" : "none";
+    rows.replaceChildren();
+    made = 0;
+    more();
+    byId("count").textContent = `${order.length} of ${stars.length} detections`;
+  };
+  for (const [key, title, , isText] of COLUMNS) {
+    const head = document.createElement("th");
+    const button = document.createElement("button");
+    head.scope = "col";
+    if (isText) head.className = "text";
+    button.type = "button";
+    button.textContent = title;
+    button.addEventListener("click", () => {
+      sorted = { key, up: sorted.key === key ? !sorted.up : true };
+      for (const other of byId("head").children) other.removeAttribute("aria-sort");
+      head.setAttribute("aria-sort", sorted.up ? "ascending" : "descending");
+      fill();
+    });
+    head.appendChild(button);
+    byId("head").appendChild(head);
+  }
+  byId("filter").addEventListener("input", fill);
+
+  // Figures.
+  const ticks = (low, high, most) => {
+    const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
+    const step = [1, 2, 5, 10].map((n) => n * power).find((s) => s >= raw);
+    const found = [];
+    for (let at = Math.ceil(low / step) * step; at <= high + step * 1e-6; at += step) found.push(Number(at.toPrecision(6)));
+    return found;
+  };
+  const figure = (caption, [xName, x0, x1], [yName, y0, y1]) => {
+    const holder = document.createElement("figure"), words = document.createElement("figcaption");
+    words.textContent = caption;
+    holder.appendChild(words);
+    byId("figures").appendChild(holder);
+    const W = 420, H = 260, left = 52, bottom = 38, top = 10, right = 12;
+    const svg = make(holder, "svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": caption });
+    const x = (v) => left + (v - x0) / (x1 - x0) * (W - left - right);
+    const y = (v) => H - bottom - (v - y0) / (y1 - y0) * (H - top - bottom);
+    for (const t of ticks(Math.min(x0, x1), Math.max(x0, x1), 6)) {
+      make(svg, "line", { class: "grid", x1: x(t), x2: x(t), y1: top, y2: H - bottom });
+      make(svg, "text", { x: x(t), y: H - bottom + 14, "text-anchor": "middle" }, t);
+    }
+    for (const t of ticks(Math.min(y0, y1), Math.max(y0, y1), 5)) {
+      make(svg, "line", { class: "grid", x1: left, x2: W - right, y1: y(t), y2: y(t) });
+      make(svg, "text", { x: left - 5, y: y(t) + 4, "text-anchor": "end" }, t);
+    }
+    make(svg, "text", { x: (left + W - right) / 2, y: H - 6, "text-anchor": "middle" }, xName);
+    make(svg, "text", { x: 12, y: (H - bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(H - bottom) / 2})` }, yName);
+    make(svg, "path", { class: "axis", d: `M${left} ${top}V${H - bottom}H${W - right}` });
+    return { svg, x, y };
+  };
+  const dot = (plot, star, x, y) => {
+    const node = make(plot.svg, "circle", { class: "dot", cx: plot.x(x), cy: plot.y(y), r: 2.2 });
+    node.addEventListener("pointerenter", () => tell(star));
+    node.addEventListener("click", () => choose(star, true));
+  };
+  const span = (values, margin) => {
+    const [low, high] = [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
+    const room = Math.max((high - low) * margin, 0.1);
+    return [low - room, high + room];
+  };
+  const lit = stars.filter((star) => star.id && star.flux > 0 && star.v !== undefined);
+  if (lit.length > 2) {
+    const mag = (star) => -2.5 * Math.log10(star.flux / data.zero_point_exposure_s);
+    const vs = span(lit.map((star) => star.v), 0.03), ms = span(lit.map(mag), 0.03);
+    const plot = figure("Magnitude against flux, with the zero point", ["V (mag)", ...vs], ["−2.5 log10 flux (mag)", ms[1], ms[0]]);
+    for (const star of lit) dot(plot, star, star.v, mag(star));
+    if (data.zero_point_vmag !== null) {
+      const ends = [Math.max(vs[0], ms[0] + data.zero_point_vmag), Math.min(vs[1], ms[1] + data.zero_point_vmag)];
+      if (ends[0] < ends[1]) make(plot.svg, "path", { class: "fit", d: ends.map((v, i) => `${i ? "L" : "M"}${plot.x(v)} ${plot.y(v - data.zero_point_vmag)}`).join("") });
+    }
+    const off = lit.filter((star) => star.residual !== undefined);
+    if (off.length > 2) {
+      const most = residuals[Math.floor(residuals.length * 0.99)] * 1.1;
+      const plot = figure("Residuals against magnitude", ["V (mag)", ...vs], ["residual (px)", 0, most]);
+      for (const star of off) if (star.residual <= most) dot(plot, star, star.v, star.residual);
+    }
+  }
+  const bins = data.completeness.filter((bin) => bin.stars > 0);
+  if (bins.length > 1) {
+    const [low, high] = [bins[0].vmag - 0.25, bins[bins.length - 1].vmag + 0.25];
+    const plot = figure("Share of the catalogue's stars that are found", ["V (mag)", low, high], ["share", 0, 1]);
+    for (const bin of bins) {
+      const part = bin.detected / bin.stars;
+      const bar = make(plot.svg, "rect", { class: "part", x: plot.x(bin.vmag - 0.22), y: plot.y(part), width: plot.x(0.44) - plot.x(0), height: plot.y(0) - plot.y(part) });
+      make(bar, "title", {}, `V ${bin.vmag}: ${bin.detected} of ${bin.stars}`);
+    }
+    const mark = (v, name, kind, down) => {
+      if (v === null || v < low || v > high) return;
+      make(plot.svg, "line", { class: kind, x1: plot.x(v), x2: plot.x(v), y1: plot.y(1), y2: plot.y(0) });
+      make(plot.svg, "text", { x: plot.x(v) + 4, y: plot.y(1) + down }, `${name} ${v.toFixed(2)}`);
+    };
+    mark(data.limit50_vmag, "half at", "fit", 10);
+    mark(data.predicted_vmag, "predicted", "predicted", 24);
+  }
+
+  fill();
+  show();
+  new ResizeObserver(show).observe(view);
+})();
