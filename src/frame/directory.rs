@@ -16,7 +16,7 @@ pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 /// The files in `directory` that begin like an image or are named as one, sorted by name.
 ///
 /// Left out are subdirectories and products of starpipe: overlays ([`is_overlay`]), calibration
-/// frames ([`is_calibration_frame`]) and headers without an image (`.wcs`). A file that cannot be
+/// frames ([`is_calibration_frame`]), copies of frames ([`is_copy`]) and headers without an image (`.wcs`). A file that cannot be
 /// opened or is empty or damaged is listed, so that reading it reports the error.
 /// # Errors
 /// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`]; without
@@ -75,7 +75,19 @@ pub const CALIBRATION_CREATOR: &str = "starpipe calibration";
 /// Whether the file that begins with `head` is a master dark, a master flat or a noise map written
 /// by starpipe.
 pub fn is_calibration_frame(head: &[u8]) -> bool {
-    let card = format!("CREATOR = '{CALIBRATION_CREATOR}");
+    is_created_by(head, CALIBRATION_CREATOR)
+}
+
+/// Beginning of the CREATOR keyword that marks the copy of a frame.
+pub const COPY_CREATOR: &str = "starpipe copy";
+
+/// Whether the file that begins with `head` is a copy of a frame, written by starpipe.
+pub fn is_copy(head: &[u8]) -> bool {
+    is_created_by(head, COPY_CREATOR)
+}
+
+fn is_created_by(head: &[u8], creator: &str) -> bool {
+    let card = format!("CREATOR = '{creator}");
     FrameFormat::of(head) == Some(FrameFormat::Fits)
         && memmem::find(head, card.as_bytes()).is_some()
 }
@@ -100,7 +112,7 @@ fn is_listed(path: &Path) -> io::Result<bool> {
     let head = head_of(path)?;
     Ok(match FrameFormat::of(&head) {
         Some(FrameFormat::Png) => !is_overlay(&head),
-        Some(FrameFormat::Fits) => !is_calibration_frame(&head),
+        Some(FrameFormat::Fits) => !is_calibration_frame(&head) && !is_copy(&head),
         Some(format) if format.is_compressed() => {
             let (known, inside) = format_inside(&head, format);
             // As in `night.fits.bz2`.

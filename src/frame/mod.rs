@@ -63,7 +63,9 @@ pub use columns::DefectiveColumn;
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
 #[doc(hidden)]
-pub use directory::{CALIBRATION_CREATOR, files_in, is_calibration_frame, is_overlay};
+pub use directory::{
+    CALIBRATION_CREATOR, COPY_CREATOR, files_in, is_calibration_frame, is_copy, is_overlay,
+};
 pub use error::FrameError;
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;

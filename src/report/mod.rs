@@ -22,6 +22,7 @@ pub mod overlay;
 pub mod page;
 mod prediction;
 mod reason;
+pub mod regions;
 #[cfg(test)]
 mod sample;
 mod star_row;

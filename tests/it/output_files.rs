@@ -73,6 +73,47 @@ fn a_frame_that_is_not_identified_has_no_header_left_from_before() {
 }
 
 #[test]
+fn pages_regions_and_copies_are_written_where_they_are_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let frame = directory.path().join("night.fits");
+    fs::copy(orion(), &frame).unwrap();
+    let process = || {
+        let mut command = starpipe();
+        command.args(["process", "--html", "--regions", "--write-fits", "--out"]);
+        Ran::new(command.args([directory.path(), &frame]))
+    };
+    // The copy of night.fits is not night.fits, and is written again and not solved.
+    for _ in 0..2 {
+        let ran = process();
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+    }
+    let page = fs::read_to_string(directory.path().join("night.html")).unwrap();
+    assert!(page.contains("Identified: ") && page.contains("data:image/jpeg;base64,"));
+    assert!(page.contains("Betelgeuse"), "no name in the page");
+    let regions = fs::read_to_string(directory.path().join("night.reg")).unwrap();
+    assert!(regions.contains("text={Betelgeuse"), "{regions}");
+
+    let mut command = starpipe();
+    command.args(["process", "--format", "json"]);
+    let copy = directory.path().join("night.solved.fits");
+    let ran = Ran::new(command.arg(&copy));
+    let mut command = starpipe();
+    command.args(["process", "--format", "json"]);
+    let original = Ran::new(command.arg(&frame));
+    for field in ["/attitude/ra_deg", "/match/matched", "/background/level"] {
+        let [of_copy, of_original] = [&ran, &original].map(|ran| number(&ran.reports()[0], field));
+        assert_eq!(of_copy, of_original, "{field}");
+    }
+    let mut command = starpipe();
+    let listed = Ran::new(
+        command
+            .args(["process", "--format", "json"])
+            .arg(directory.path()),
+    );
+    assert_eq!(listed.reports().len(), 1, "{}", listed.stdout);
+}
+
+#[test]
 fn an_overlay_never_overwrites_the_frame_that_it_is_made_of() {
     let directory = tempfile::tempdir().unwrap();
     let frame = directory.path().join("night.png");

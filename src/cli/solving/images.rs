@@ -23,8 +23,8 @@ impl Inputs {
     /// Extensions of the result files of an image.
     pub(super) fn result_extensions(&self) -> &'static [&'static str] {
         match self {
-            Self::Frames(_) => &["json", "csv", "png", "wcs", "html"],
-            Self::Lists(_) => &["json", "csv", "wcs", "html"],
+            Self::Frames(_) => &["json", "csv", "png", "wcs"],
+            Self::Lists(_) => &["json", "csv", "wcs"],
         }
     }
 }

@@ -87,6 +87,13 @@ pub(super) struct OutputOptions {
     /// in a browser
     #[arg(long, requires = "out")]
     pub(super) html: bool,
+    /// With --out, also write FRAME.solved.fits: a copy of an identified frame with its coordinates (WCS) in the
+    /// header
+    #[arg(long, requires = "out")]
+    pub(super) write_fits: bool,
+    /// With --out, also write FRAME.reg: the detections as regions for SAOImage DS9
+    #[arg(long, requires = "out")]
+    pub(super) regions: bool,
     /// How FRAME.png shows the frame
     #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
     stretch: StretchOption,
@@ -118,6 +125,17 @@ enum RingsOption {
 }
 
 impl OutputOptions {
+    /// Extensions of the result files that are written where they are asked for.
+    pub(super) fn further_extensions(&self) -> Vec<&'static str> {
+        let asked = [
+            (self.html, "html"),
+            (self.write_fits, "solved.fits"),
+            (self.regions, "reg"),
+        ];
+        let wanted = asked.into_iter().filter(|(is_wanted, _)| *is_wanted);
+        wanted.map(|(_, extension)| extension).collect()
+    }
+
     /// How to draw overlays.
     pub(super) fn overlay(&self) -> OverlayOptions {
         let mut options = OverlayOptions::default();

@@ -50,7 +50,8 @@ pub(crate) fn report_all(
         output, catalog, ..
     } = options;
     if let Some(directory) = &output.out {
-        overwrite::check(paths, directory, inputs.result_extensions())?;
+        let extensions = [inputs.result_extensions(), &output.further_extensions()].concat();
+        overwrite::check(paths, directory, &extensions)?;
     }
     let mut run = Run {
         printer: Printer::new(&output, paths.len()),

@@ -9,7 +9,7 @@ use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
-use starpipe::report::{FrameReport, page, wcs, write_table_header};
+use starpipe::report::{FrameReport, page, regions, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 use std::path::PathBuf;
 
@@ -19,6 +19,10 @@ pub(super) struct ResultFiles {
     overlay: OverlayOptions,
     /// Whether pages are wanted.
     html: bool,
+    /// Whether copies with coordinates are wanted.
+    copy: bool,
+    /// Whether regions are wanted.
+    regions: bool,
 }
 
 impl ResultFiles {
@@ -30,6 +34,8 @@ impl ResultFiles {
             directory,
             overlay: options.overlay(),
             html: options.html,
+            copy: options.write_fits,
+            regions: options.regions,
         })
     }
 
@@ -69,6 +75,13 @@ impl ResultFiles {
         if self.html {
             let page = page::html(report, &solved.solution, shown.as_ref(), &self.overlay)?;
             files.push((path("html"), page.into_bytes()));
+        }
+        if self.regions {
+            files.push((path("reg"), regions::ds9(report).into_bytes()));
+        }
+        if let Some(frame) = frame.filter(|_| self.copy) {
+            let copy = wcs::solved_copy(&report.frame, frame, &solved.solution)?;
+            files.extend(copy.map(|copy| (path("solved.fits"), copy)));
         }
         let header = wcs::header(&report.frame, &solved.solution);
         let has_header = header.is_some();

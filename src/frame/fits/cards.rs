@@ -79,7 +79,7 @@ impl FitsHeader {
     }
 
     /// Appends the cards of `other`.
-    pub(super) fn extend(&mut self, other: &Self) {
+    pub(crate) fn extend(&mut self, other: &Self) {
         self.cards.extend_from_slice(&other.cards);
     }
 

@@ -19,6 +19,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use data::PageData;
 use image::codecs::jpeg::JpegEncoder;
+use memchr::memmem;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
 use std::io;
@@ -56,6 +57,13 @@ pub fn html(
         })
     });
     page.map_err(io::Error::other)
+}
+
+/// Whether the file that begins with `head` is a page written by starpipe.
+#[doc(hidden)]
+pub fn is_page(head: &[u8]) -> bool {
+    const GENERATOR: &[u8] = b"<meta name=\"generator\" content=\"starpipe\">";
+    memmem::find(head, GENERATOR).is_some()
 }
 
 /// The frame without marks, as JPEG.
@@ -104,6 +112,7 @@ mod tests {
         assert!(!page.contains("<script>alert") && !page.contains("</script><b>"));
         assert!(page.contains("&lt;script&gt;alert(1)&lt;&#x2f;script&gt;.tif"));
         assert_eq!(page.matches("</script>").count(), 2);
+        assert!(is_page(page.as_bytes()));
     }
 
     #[test]

@@ -25,7 +25,8 @@
   const layers = {};
   for (const name of ["other", "unidentified", "identified", "residuals", "names"]) layers[name] = make(view, "g");
   const box = { x: -0.5, y: -0.5, w: width, h: height };
-  const unit = () => box.w / Math.max(view.clientWidth, 1);
+  // Pixels of the frame in one of the screen.
+  const unit = () => Math.max(box.w / Math.max(view.clientWidth, 1), box.h / Math.max(view.clientHeight, 1));
   const radius = (star) => {
     const above = star.flux > 0 ? 2.5 * Math.log10(star.flux / faintest) : 0;
     return Math.min(4 + Math.max(above, 0), 13);

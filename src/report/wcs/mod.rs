@@ -19,7 +19,9 @@ mod sip;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
-use crate::frame::{FitsHeader, RowOrder};
+use crate::frame::{
+    COPY_CREATOR, FitsHeader, FitsSamples, FitsWriteError, Frame, RowOrder, write_fits,
+};
 use crate::identify::{Identification, SkyView};
 use crate::pipeline::{Outcome, Solution};
 use crate::sky::places::AttitudeFrame;
@@ -51,18 +53,57 @@ const SOLVED_BY: &str = "Solved by starpipe";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
-    let Outcome::Identified(identification) = &solution.outcome else {
-        return None;
-    };
+    let row_order = solution.row_order.unwrap_or_default();
+    let solved = cards(frame, solution, row_order)?;
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS header without data");
     header.integer("BITPIX", 8, "");
     header.integer("NAXIS", 0, "the image is in the file named below");
     header.integer("IMAGEW", solution.width as i64, "columns of the image");
     header.integer("IMAGEH", solution.height as i64, "rows of the image");
-    let row_order = solution.row_order.unwrap_or_default();
     let order = row_order.keyword_value();
     header.text("ROWORDER", order, "of the image's file");
+    header.extend(&solved);
+    Some(header.to_bytes())
+}
+
+/// A copy of the frame named `name` as FITS, its top row first, with its coordinates in the header; `None`
+/// where it is not identified. Levels are unsigned integers of 16 bits where all of them fit, else floats.
+///
+/// # Errors
+/// None of a frame that was read.
+pub fn solved_copy(
+    name: &str,
+    frame: &Frame,
+    solution: &Solution,
+) -> Result<Option<Vec<u8>>, FitsWriteError> {
+    let Some(solved) = cards(name, solution, RowOrder::TopDown) else {
+        return Ok(None);
+    };
+    let mut header = FitsHeader::default();
+    header.text("CREATOR", COPY_CREATOR, "with its coordinates");
+    if let Some(exposure_s) = solution.exposure_s {
+        header.real("EXPTIME", exposure_s, "[s] exposure");
+    }
+    header.extend(&solved);
+    let write = |samples| {
+        let mut file = Vec::new();
+        write_fits(&mut file, frame, samples, &header).map(|()| file)
+    };
+    let file = match write(FitsSamples::Unsigned16) {
+        Err(FitsWriteError::NoLevel { .. }) => write(FitsSamples::Float32),
+        file => file,
+    };
+    file.map(Some)
+}
+
+/// The cards of the coordinates of the frame named `frame`, in a file with its rows in this order; `None`
+/// where it is not identified.
+fn cards(frame: &str, solution: &Solution, row_order: RowOrder) -> Option<FitsHeader> {
+    let Outcome::Identified(identification) = &solution.outcome else {
+        return None;
+    };
+    let mut header = FitsHeader::default();
     let view = SkyView {
         camera: &identification.camera,
         icrs_to_camera: &identification.icrs_to_camera,
@@ -76,7 +117,7 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
         header.text("TIMESYS", "UTC", "");
     }
     add_history(&mut header, frame, solution, identification);
-    Some(header.to_bytes())
+    Some(header)
 }
 
 /// Whether `file` is a header written by [`header`].
