@@ -193,33 +193,52 @@ mod tests {
         [x, y - CAPITALS * SIZE, x + text_width(&label.text, SIZE), y]
     }
 
+    /// A frame with `count` stars, of which some have names.
+    fn random_marks(random: &mut ChaCha8Rng, count: usize, image: [f32; 2]) -> Vec<Mark> {
+        const NAMES: [&str; 4] = ["α CMi", "Betelgeuse", "05140095", "θ² Ori"];
+        let star = |i: usize| {
+            let [x, y] = image.map(|side| random.random_range(0.0..side));
+            let mut star = mark(x, y, i as f32 * 0.01);
+            star.radius = random.random_range(4.0..13.0);
+            let name = random.random_range(0..NAMES.len());
+            star.label = star.label.map(|label| StarLabel {
+                text: format!("{} {:.1}", NAMES[name], label.v_mag),
+                has_name: name != 2,
+                ..label
+            });
+            star
+        };
+        (0..count).map(star).collect()
+    }
+
     #[test]
-    fn names_in_a_crowd_hide_neither_each_other_nor_bright_stars() {
+    fn names_hide_neither_each_other_nor_what_is_marked_in_200_frames() {
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let marks: Vec<Mark> = (0..1500)
-            .map(|i| {
-                let (x, y) = (
-                    random.random_range(0.0..800.0),
-                    random.random_range(0.0..600.0),
-                );
-                mark(x, y, i as f32 * 0.01)
-            })
-            .collect();
-        let (shown, labels) = place(&marks, Rings::Named, IMAGE, 1.0);
-        assert!(labels.len() > 15, "{}", labels.len());
-        assert_eq!(labels.len(), shown.len());
-        assert!(labels.len() <= 54);
-        for (i, label) in labels.iter().enumerate() {
-            let own = rectangle(label);
-            assert!(lies_within(&own, IMAGE));
-            assert!(
-                labels[..i]
-                    .iter()
-                    .all(|other| !overlap(&own, &rectangle(other)))
-            );
-            let hidden = shown.iter().filter(|m| m.is_covered_by(&own));
-            assert_eq!(hidden.count(), 0, "{label:?}");
+        let mut placed = 0;
+        for frame in 0..200 {
+            let image = [0, 1].map(|_| random.random_range(300.0..2500.0));
+            let unit = random.random_range(1.0..2.0);
+            let count = random.random_range(1..700);
+            let marks = random_marks(&mut random, count, image);
+            let rings = [Rings::Named, Rings::All, Rings::None][frame % 3];
+            let (shown, labels) = place(&marks, rings, image, unit);
+            assert!(rings != Rings::Named || labels.len() == shown.len());
+            placed += labels.len();
+            let rectangle = |label: &Label| {
+                let [x, y] = label.at;
+                let size = SIZE * unit;
+                [x, y - CAPITALS * size, x + text_width(&label.text, size), y]
+            };
+            for (i, label) in labels.iter().enumerate() {
+                let own = rectangle(label);
+                assert!(lies_within(&own, image));
+                let mut before = labels[..i].iter();
+                assert!(before.all(|other| !overlap(&own, &rectangle(other))));
+                let hidden = shown.iter().find(|m| m.is_covered_by(&own));
+                assert!(hidden.is_none(), "frame {frame}: {label:?}");
+            }
         }
+        assert!(placed > 5000, "{placed}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ pub(super) struct PageData<'a> {
     width: usize,
     height: usize,
     /// Detections, brightest first.
-    stars: Vec<PageStar<'a>>,
+    stars: StarColumns<'a>,
     completeness: &'a [CompletenessReport],
     zero_point_vmag: Option<f64>,
     /// Seconds by which fluxes are divided before the zero point applies.
@@ -21,36 +21,40 @@ pub(super) struct PageData<'a> {
     predicted_vmag: Option<f64>,
 }
 
-/// A detection.
-#[derive(Debug, Serialize)]
-struct PageStar<'a> {
-    x: f64,
-    y: f64,
-    #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    offset: Option<Offset>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    snr: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    flux: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    id: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    name: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    v: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ra: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    dec: Option<f64>,
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    flags: &'a [&'static str],
+/// The columns of the detections, which take half of the room of rows with names.
+#[derive(Debug, Default, Serialize)]
+struct StarColumns<'a> {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Observed minus predicted position, in pixels.
+    dx: Vec<Option<f64>>,
+    dy: Vec<Option<f64>>,
+    snr: Vec<Option<f64>>,
+    flux: Vec<Option<f64>>,
+    id: Vec<Option<&'a str>>,
+    name: Vec<Option<&'a str>>,
+    v: Vec<Option<f64>>,
+    ra: Vec<Option<f64>>,
+    dec: Vec<Option<f64>>,
+    flags: Vec<&'a [&'static str]>,
 }
 
-/// Observed minus predicted position, in pixels.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Offset {
-    dx: f64,
-    dy: f64,
+impl<'a> StarColumns<'a> {
+    fn add(&mut self, star: &'a StarReport, offset: Option<[f64; 2]>) {
+        let rounded = |value: f64, decimals| to_decimals(value, decimals);
+        self.x.push(rounded(star.x, 2));
+        self.y.push(rounded(star.y, 2));
+        self.dx.push(offset.map(|[dx, _]| rounded(dx, 3)));
+        self.dy.push(offset.map(|[_, dy]| rounded(dy, 3)));
+        self.snr.push(star.snr);
+        self.flux.push(star.flux);
+        self.id.push(star.id.as_deref());
+        self.name.push(star.name.as_deref());
+        self.v.push(star.vmag);
+        self.ra.push(star.ra_deg.map(|ra| rounded(ra, 4)));
+        self.dec.push(star.dec_deg.map(|dec| rounded(dec, 4)));
+        self.flags.push(&star.flags);
+    }
 }
 
 impl<'a> PageData<'a> {
@@ -59,23 +63,14 @@ impl<'a> PageData<'a> {
         let offsets = offsets(solution);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));
-        let star = |(star, offset): (&'a StarReport, Option<Offset>)| PageStar {
-            x: to_decimals(star.x, 2),
-            y: to_decimals(star.y, 2),
-            offset,
-            snr: star.snr,
-            flux: star.flux,
-            id: star.id.as_deref(),
-            name: star.name.as_deref(),
-            v: star.vmag,
-            ra: star.ra_deg.map(|ra| to_decimals(ra, 5)),
-            dec: star.dec_deg.map(|dec| to_decimals(dec, 5)),
-            flags: &star.flags,
-        };
+        let mut stars = StarColumns::default();
+        for (star, offset) in report.stars.iter().zip(offsets) {
+            stars.add(star, offset);
+        }
         Self {
             width: report.width,
             height: report.height,
-            stars: report.stars.iter().zip(offsets).map(star).collect(),
+            stars,
             completeness: photometry.map_or(&[], |photometry| &photometry.completeness),
             zero_point_vmag: photometry.and_then(|photometry| photometry.zero_point_vmag),
             zero_point_exposure_s: report.exposure_s.filter(|_| is_rate).unwrap_or(1.0),
@@ -86,7 +81,7 @@ impl<'a> PageData<'a> {
 }
 
 /// Observed minus predicted positions of the identified stars, in the order of the detections.
-fn offsets(solution: &Solution) -> Vec<Option<Offset>> {
+fn offsets(solution: &Solution) -> Vec<Option<[f64; 2]>> {
     let mut offsets = vec![None; solution.sources.len()];
     let Some(found) = solution.outcome.identification() else {
         return offsets;
@@ -98,10 +93,7 @@ fn offsets(solution: &Solution) -> Vec<Option<Offset>> {
             .pixel_of(&found.icrs_to_camera.apply(&star_match.light));
         if let (Some(offset), Some(predicted)) = (offsets.get_mut(source), predicted) {
             let observed = solution.sources[source].position;
-            *offset = Some(Offset {
-                dx: to_decimals(observed.x - predicted.x, 3),
-                dy: to_decimals(observed.y - predicted.y, 3),
-            });
+            *offset = Some([observed.x - predicted.x, observed.y - predicted.y]);
         }
     }
     offsets

@@ -10,11 +10,15 @@
     parent.appendChild(node);
     return node;
   };
-  const { width, height, stars } = data;
+  const { width, height } = data;
+  const columns = Object.entries(data.stars);
+  const stars = data.stars.x.map((_, row) => {
+    const given = columns.filter(([, values]) => values[row] !== null);
+    return Object.fromEntries(given.map(([key, values]) => [key, values[row]]));
+  });
   const NOT_STARS = ["hot_pixel", "trail", "extended"];
   stars.forEach((star, index) => {
     star.index = index;
-    star.flags = star.flags || [];
     const odd = star.flags.some((flag) => NOT_STARS.includes(flag));
     star.kind = star.id ? "identified" : odd ? "other" : "unidentified";
     star.residual = star.dx === undefined ? undefined : Math.hypot(star.dx, star.dy);
