@@ -49,6 +49,33 @@ impl Lens {
     }
 }
 
+/// A lens that was chosen.
+#[derive(Clone, Copy)]
+pub struct ChosenLens {
+    /// The lens.
+    pub lens: Lens,
+    /// Variance of ln f, about that of the lens, among projections that explain the stars nearly as well.
+    pub ln_f_variance: f64,
+}
+
+impl From<Lens> for ChosenLens {
+    /// A lens without rivals.
+    fn from(lens: Lens) -> Self {
+        Self {
+            lens,
+            ln_f_variance: 0.0,
+        }
+    }
+}
+
+/// A projection with the distortion that it needs.
+struct Rival {
+    lens: Lens,
+    /// −2 ln of its likelihood, with penalties.
+    misfit: f64,
+    focal_length_px: f64,
+}
+
 /// A camera with another projection, which sees the same near the axis of its lens, and its attitude.
 pub fn with_projection(
     hypothesis: &Hypothesis,
@@ -80,10 +107,24 @@ pub struct LensChoice<'a> {
     pub residuals_px: &'a mut Vec<[f64; 2]>,
 }
 
+impl Rival {
+    /// Variance of ln f about this one's among all, which count as likely as they are.
+    ///
+    /// # Reference
+    /// Hoeting et al. 1999, Statist. Sci. 14, 382, eq. 2, for the variance between models.
+    fn ln_f_variance(&self, all: &[Self]) -> f64 {
+        let weight = |rival: &Self| (0.5 * (self.misfit - rival.misfit)).exp();
+        let squared = |rival: &Self| (rival.focal_length_px / self.focal_length_px).ln().powi(2);
+        let weights: f64 = all.iter().map(weight).sum();
+        let squares: f64 = all.iter().map(|rival| weight(rival) * squared(rival)).sum();
+        squares / weights
+    }
+}
+
 impl LensChoice<'_> {
     /// The lens that predicts left-out stars best, for its number of terms. Only a wide field tells
     /// projections apart.
-    pub fn choose(&mut self, hypothesis: &Hypothesis, richest: DistortionModel) -> Lens {
+    pub fn choose(&mut self, hypothesis: &Hypothesis, richest: DistortionModel) -> ChosenLens {
         let is_regular = !depend_on_place(self.field, self.stars, self.residuals_px);
         let least = DistortionModel::Stretched;
         let affordable = |model: &DistortionModel| is_affordable(*model, self.stars.len());
@@ -109,22 +150,24 @@ impl LensChoice<'_> {
         let model = hypothesis.camera.distortion_model();
         let (model, misfit) = linear.unwrap_or((model, f64::INFINITY));
         if is_regular || richest <= DistortionModel::Radial || model >= Some(least) {
-            return Lens { projection, model };
+            return Lens { projection, model }.into();
         }
         // A lens that is far from the present one shows what it is worth only once it is fitted.
         let fitted = self.fitted_lens(&hypothesis, projection);
         let richer = fitted.and_then(|fitted| self.choose_model(&fitted, richest));
         let better = richer.filter(|(richer, less)| *richer > model && *less < misfit);
-        Lens {
-            projection,
-            model: better.map_or(model, |(model, _)| model),
-        }
+        let model = better.map_or(model, |(model, _)| model);
+        Lens { projection, model }.into()
     }
 
     /// The lens whose projection, with the distortion that it needs, predicts left-out stars best. One
     /// that needs more distortion than a pinhole is no better than a pinhole.
-    fn choose_projection(&mut self, hypothesis: &Hypothesis, richest: DistortionModel) -> Lens {
-        let mut best: Option<(f64, Lens)> = None;
+    fn choose_projection(
+        &mut self,
+        hypothesis: &Hypothesis,
+        richest: DistortionModel,
+    ) -> ChosenLens {
+        let mut rivals: Vec<Rival> = Vec::new();
         let mut pinhole_px = f64::INFINITY;
         for projection in Projection::ALL {
             let Some(fitted) = self.fitted_lens(hypothesis, projection) else {
@@ -135,18 +178,22 @@ impl LensChoice<'_> {
             };
             let distortion = fitted.camera.distortion().filter(|_| model.is_some());
             let largest_px = distortion.map_or(0.0, Distortion::largest_px);
-            let is_pinhole = projection == Projection::Pinhole;
-            if is_pinhole {
+            if projection == Projection::Pinhole {
                 pinhole_px = largest_px;
             } else if largest_px > pinhole_px {
                 continue;
             }
-            let penalty = worth_a_projection(projection);
-            if best.is_none_or(|(least, _)| misfit + penalty < least) {
-                best = Some((misfit + penalty, Lens { projection, model }));
-            }
+            rivals.push(Rival {
+                lens: Lens { projection, model },
+                misfit: misfit + worth_a_projection(projection),
+                focal_length_px: fitted.camera.central_focal_length_px(),
+            });
         }
-        best.map_or(Lens::of(&hypothesis.camera), |(_, lens)| lens)
+        let best = rivals.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit));
+        best.map_or(Lens::of(&hypothesis.camera).into(), |best| ChosenLens {
+            lens: best.lens,
+            ln_f_variance: best.ln_f_variance(&rivals),
+        })
     }
 
     /// The best lens of a projection, with all the terms of lenses that the stars can afford.

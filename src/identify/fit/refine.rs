@@ -4,7 +4,9 @@
 //! support
 
 use super::adjustment::robust_sigma_px;
-use super::lens_choice::{Lens, LensChoice, depend_on_place, is_affordable, with_projection};
+use super::lens_choice::{
+    ChosenLens, Lens, LensChoice, depend_on_place, is_affordable, with_projection,
+};
 use super::{CameraFit, MeasuredStar, fit_camera, fit_known_lens};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::statistics::median;
@@ -187,7 +189,7 @@ impl Refiner {
             if settled {
                 // The pairs are the same, with the residuals of the fit.
                 std::mem::swap(&mut self.pairs, &mut self.before);
-                lens = self.choose_lens(problem, &current, start.richest);
+                lens = self.choose_lens(problem, &current, start.richest).lens;
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 is_lens_chosen = true;
             }
@@ -229,6 +231,7 @@ impl Refiner {
         let mut lens = Lens::of(&hypothesis.camera);
         lens.model = lens.model.max(wanted.min_distortion);
         let mut current = *settled;
+        let mut ln_f_variance = 0.0;
         for round in 0..MAX_NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
             if round > 0 {
@@ -249,7 +252,9 @@ impl Refiner {
                 || (!settled && self.are_residuals_unexplained(problem, &current))
                 || self.depend_on_place(problem);
             if is_open {
-                let mut chosen = self.choose_lens(problem, &current, DistortionModel::Irregular5);
+                let choice = self.choose_lens(problem, &current, DistortionModel::Irregular5);
+                ln_f_variance = choice.ln_f_variance;
+                let mut chosen = choice.lens;
                 chosen.model = chosen.model.max(wanted.min_distortion);
                 guess.lens = chosen;
                 // A lens that cannot be fitted is not the right one.
@@ -263,6 +268,7 @@ impl Refiner {
                 break;
             }
         }
+        current.fit.covariance[(3, 3)] += ln_f_variance;
         Some(current)
     }
 
@@ -413,9 +419,9 @@ impl Refiner {
         problem: Problem,
         current: &Refined,
         richest: DistortionModel,
-    ) -> Lens {
+    ) -> ChosenLens {
         if self.known_lens(problem.field).is_some() {
-            return Lens::of(&current.fit.camera);
+            return Lens::of(&current.fit.camera).into();
         }
         self.measure(problem, current.excess_sigma_px);
         let mut choice = LensChoice {
