@@ -8,7 +8,7 @@
 //! 3. Figures: magnitude against flux, residuals, completeness with the predicted limit.
 //! 4. The table of the detections.
 //!
-//! `page.js` draws 2 to 4 from the data of [`PageData`].
+//! `page.js` draws 2 to 4 from the numbers in the page.
 
 mod data;
 
