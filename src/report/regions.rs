@@ -35,11 +35,10 @@ pub fn ds9(report: &FrameReport) -> String {
 fn region(star: &StarReport, x: f64, y: f64) -> String {
     /// Radius in pixels.
     const RADIUS_PX: f64 = 6.0;
-    const UNLIKE_STARS: [&str; 3] = ["hot_pixel", "trail", "extended"];
     if let Some(name) = star.name.as_ref().or(star.id.as_ref()) {
         return format!("circle({x:.3},{y:.3},{RADIUS_PX}) # text={{{name}}}");
     }
-    if star.flags.iter().any(|flag| UNLIKE_STARS.contains(flag)) {
+    if !star.is_star_like() {
         return format!("point({x:.3},{y:.3}) # point=x color=magenta");
     }
     let side = 2.0 * RADIUS_PX;

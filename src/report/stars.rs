@@ -98,6 +98,12 @@ impl ReportedPointing<'_> {
 }
 
 impl StarReport {
+    /// Whether the detection may be a star at its position: [`DetectionFlags::is_star_like`].
+    pub(super) fn is_star_like(&self) -> bool {
+        const UNLIKE_STARS: [&str; 3] = ["hot_pixel", "trail", "extended"];
+        !self.flags.iter().any(|flag| UNLIKE_STARS.contains(flag))
+    }
+
     fn set_direction(&mut self, direction: &UnitVector<Icrs>) {
         let (ra_rad, dec_rad) = direction.to_ra_dec();
         self.ra_deg = Some(turn_deg(ra_rad * DEG_PER_RAD, DIRECTION_DECIMALS));
@@ -131,5 +137,25 @@ mod tests {
             ..DetectionFlags::default()
         };
         assert_eq!(flag_names(flags), ["saturated", "border"]);
+    }
+
+    #[test]
+    fn a_report_is_star_like_where_its_flags_are() {
+        for bit in 0..64 {
+            let is_set = |place: u32| bit >> place & 1 == 1;
+            let flags = DetectionFlags {
+                saturated: is_set(0),
+                hot_pixel: is_set(1),
+                trail: is_set(2),
+                extended: is_set(3),
+                blended: is_set(4),
+                border: is_set(5),
+            };
+            let report = StarReport {
+                flags: flag_names(flags),
+                ..StarReport::default()
+            };
+            assert_eq!(report.is_star_like(), flags.is_star_like(), "{flags:?}");
+        }
     }
 }

@@ -209,3 +209,79 @@ fn candidate_cut(background: &[f32], sigma: &[f32], threshold: f32) -> f32 {
 fn with_neighbors(rows: &Range<usize>, height: usize) -> Range<usize> {
     rows.start.saturating_sub(1)..(rows.end + 1).min(height)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::pixels::Samples;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const SIDE: usize = 256;
+    const NOISE: f32 = 5.0;
+
+    fn white_noise() -> Vec<f32> {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let noise = (0..SIDE * SIDE).map(|_| NOISE * random.sample::<f32, _>(StandardNormal));
+        noise.collect()
+    }
+
+    /// Noise of the filtered light, and of its slopes along x and y, in the middle of a frame.
+    fn noises_of(pixels: &[f32]) -> (f32, [f32; 2]) {
+        let view = View::new(Samples::F32(pixels), SIDE, SIDE);
+        let mut background = Mesh::default();
+        background.measure(&view, &MeshConfig::of_pixels(64, 1e-6));
+        let limits = CandidateLimits {
+            threshold: 5.0,
+            most: 100_000,
+        };
+        let mut filtered = FilteredFrame::default();
+        filtered.set_threads(1);
+        let kernel = Kernel::for_spot(1.2);
+        let done = filtered.filter(&view, &background, &kernel, 64, &limits);
+        done.unwrap();
+        let middle = SIDE as f32 / 2.0;
+        let (_, sigma) = filtered.mesh.at(middle, middle);
+        (sigma, filtered.mesh.slope_sigma_at(middle, middle))
+    }
+
+    #[test]
+    fn clouds_widen_the_light_and_not_its_slopes() {
+        let pixels = white_noise();
+        let (sigma, slopes) = noises_of(&pixels);
+        for noise in [sigma, slopes[0], slopes[1]] {
+            assert!((noise - 1.0).abs() < 0.05, "{noise}");
+        }
+        let wave =
+            |i: usize| 15.0 * ((i % SIDE) as f32 / 6.0).sin() * ((i / SIDE) as f32 / 6.0).sin();
+        let cloudy: Vec<f32> = pixels
+            .iter()
+            .enumerate()
+            .map(|(i, v)| v + wave(i))
+            .collect();
+        let (sigma, slopes) = noises_of(&cloudy);
+        assert!(sigma > 3.0, "{sigma}");
+        assert!(
+            slopes.iter().all(|slope| *slope < 0.5 * sigma),
+            "{slopes:?} {sigma}"
+        );
+    }
+
+    #[test]
+    fn noise_that_all_pixels_of_a_row_share_is_an_error_along_y() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let rows: Vec<f32> = (0..SIDE)
+            .map(|_| NOISE * random.sample::<f32, _>(StandardNormal))
+            .collect();
+        let pixels = white_noise();
+        let banded: Vec<f32> = pixels
+            .iter()
+            .enumerate()
+            .map(|(i, v)| v + rows[i / SIDE])
+            .collect();
+        let (_, [along_x, along_y]) = noises_of(&banded);
+        assert!((along_x - 1.0).abs() < 0.1, "{along_x}");
+        assert!(along_y > 1.5, "{along_y}");
+    }
+}

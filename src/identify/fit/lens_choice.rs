@@ -8,6 +8,7 @@ use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
 use crate::identify::field::StarField;
 use crate::identify::grid::FrameGrid;
 use crate::identify::hypothesis::Hypothesis;
+use arrayvec::ArrayVec;
 
 /// Equations per parameter that a distortion model needs.
 const EQUATIONS_PER_PARAMETER: f64 = 4.0;
@@ -167,7 +168,7 @@ impl LensChoice<'_> {
         hypothesis: &Hypothesis,
         richest: DistortionModel,
     ) -> ChosenLens {
-        let mut rivals: Vec<Rival> = Vec::new();
+        let mut rivals = ArrayVec::<Rival, { Projection::ALL.len() }>::new();
         let mut pinhole_px = f64::INFINITY;
         for projection in Projection::ALL {
             let Some(fitted) = self.fitted_lens(hypothesis, projection) else {

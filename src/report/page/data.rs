@@ -13,6 +13,8 @@ pub(super) struct PageData<'a> {
     height: usize,
     /// Detections, brightest first.
     stars: StarColumns<'a>,
+    /// Numbers of those that are not shaped like stars.
+    unlike_stars: Vec<usize>,
     completeness: &'a [CompletenessReport],
     zero_point_vmag: Option<f64>,
     /// Seconds by which fluxes are divided before the zero point applies.
@@ -63,6 +65,9 @@ impl<'a> PageData<'a> {
         let offsets = offsets(solution);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));
+        let unlike = |(_, star): &(usize, &StarReport)| !star.is_star_like();
+        let numbered = report.stars.iter().enumerate();
+        let unlike_stars = numbered.filter(unlike).map(|(number, _)| number).collect();
         let mut stars = StarColumns::default();
         for (star, offset) in report.stars.iter().zip(offsets) {
             stars.add(star, offset);
@@ -71,6 +76,7 @@ impl<'a> PageData<'a> {
             width: report.width,
             height: report.height,
             stars,
+            unlike_stars,
             completeness: photometry.map_or(&[], |photometry| &photometry.completeness),
             zero_point_vmag: photometry.and_then(|photometry| photometry.zero_point_vmag),
             zero_point_exposure_s: report.exposure_s.filter(|_| is_rate).unwrap_or(1.0),

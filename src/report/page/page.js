@@ -16,11 +16,10 @@
     const given = columns.filter(([, values]) => values[row] !== null);
     return Object.fromEntries(given.map(([key, values]) => [key, values[row]]));
   });
-  const NOT_STARS = ["hot_pixel", "trail", "extended"];
+  const unlikeStars = new Set(data.unlike_stars);
   stars.forEach((star, index) => {
     star.index = index;
-    const odd = star.flags.some((flag) => NOT_STARS.includes(flag));
-    star.kind = star.id ? "identified" : odd ? "other" : "unidentified";
+    star.kind = star.id ? "identified" : unlikeStars.has(index) ? "other" : "unidentified";
     star.residual = star.dx === undefined ? undefined : Math.hypot(star.dx, star.dy);
   });
 
