@@ -216,6 +216,8 @@ impl Curve {
         /// Share of the pixels that are black, and that are white.
         const BLACK_SHARE: f32 = 2e-3;
         const WHITE_SHARE: f32 = 5e-4;
+        /// Share of the pixels above the level of the sky: the rest may be trees or the ground.
+        const SKY_SHARE: f32 = 0.25;
         let shares = match sky_levels {
             Some(_) => [1.0 - BLACK_SHARE, WHITE_SHARE],
             None => [1.0, 0.0],
@@ -226,7 +228,7 @@ impl Curve {
             range: (white - black).max(f32::MIN_POSITIVE),
             middle: 0.5,
         };
-        let sky = curve.share(level_exceeded_by(light, 0.5));
+        let sky = curve.share(level_exceeded_by(light, SKY_SHARE));
         if let Some([dark, bright]) = sky_levels.filter(|_| sky > 0.0 && sky < 1.0) {
             // The curve is steepest at black.
             let steepest =
@@ -408,26 +410,24 @@ mod tests {
                 .map(|i| level + 4.0 * noise(i) + star(i))
                 .collect()
         };
-        let middle = |greys: Vec<u8>| {
-            greys[50_001..50_102]
-                .iter()
-                .map(|g| f64::from(*g))
-                .sum::<f64>()
-                / 101.0
-        };
-        let photograph = |light: &[f32], sky_levels| {
+        // The level that a quarter of the picture exceeds.
+        let sky_of = |light: &[f32], sky_levels| {
             let curve = Curve::of(light, 0.0, sky_levels);
-            light.iter().map(|level| curve.apply(*level)).collect()
+            let mut levels: Vec<u8> = light.iter().map(|level| curve.apply(*level)).collect();
+            levels.sort_unstable();
+            levels[light.len() * 3 / 4]
         };
-        let dark = middle(photograph(&with_sky(10.0), Some(SKY_LEVELS)));
-        assert!((40.0..60.0).contains(&dark), "{dark}");
-        let plain = middle(photograph(&with_sky(10.0), None));
-        assert!(plain < 2.0, "{plain}");
+        assert_eq!(sky_of(&with_sky(10.0), Some(SKY_LEVELS)), 51);
+        assert_eq!(sky_of(&with_sky(10.0), None), 1);
+        // Half of the frame is trees.
+        let mut behind_trees = with_sky(10.0);
+        behind_trees[..50_000].fill(0.0);
+        behind_trees[60_000..60_100].fill(1000.0);
+        assert_eq!(sky_of(&behind_trees, Some(SKY_LEVELS)), 51);
         let day: Vec<f32> = (0..100_000)
             .map(|i| 90.0 + noise(i) * 10.0 - noise(7 * i) * 90.0)
             .collect();
-        let sky = middle(photograph(&day, Some(SKY_LEVELS)));
-        assert!((60.0..110.0).contains(&sky), "{sky}");
+        assert_eq!(sky_of(&day, Some(SKY_LEVELS)), 89);
     }
 
     #[test]
