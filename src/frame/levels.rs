@@ -208,7 +208,7 @@ pub(super) fn frame_from_floats(
 }
 
 /// The luminance of one pixel; `full` if a channel is saturated.
-fn luminance(rgb: [f32; 3], full: f32) -> f32 {
+pub(crate) fn luminance(rgb: [f32; 3], full: f32) -> f32 {
     if rgb.iter().any(|&channel| channel >= full) {
         return full;
     }

@@ -72,6 +72,8 @@ pub use format::FrameFormat;
 pub use image::Frame;
 #[doc(hidden)]
 pub use image::check_size;
+#[cfg(feature = "overlay")]
+pub(crate) use levels::luminance;
 #[doc(hidden)]
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
 #[doc(hidden)]

@@ -61,7 +61,7 @@ pub(crate) fn report_all(
         },
         tally: Tally::default(),
     };
-    let files = ResultFiles::new(&output)?;
+    let files = ResultFiles::new(&output, plan.memory)?;
     let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
         catalog.with_index(|pool, indexed| {
@@ -74,7 +74,6 @@ pub(crate) fn report_all(
                     files,
                     needs_rows,
                     catalog: indexed.catalog(),
-                    memory: plan.memory,
                 },
             };
             solver.solve_all(paths, |images| run.take_all(images));
@@ -88,11 +87,10 @@ pub(crate) fn report_all(
 
 /// Makes reports and result files. The threads that solve also draw and write; one only prints.
 struct Reports<'a> {
-    files: ResultFiles,
+    files: ResultFiles<'a>,
     /// Whether rows of the table of frames are wanted.
     needs_rows: bool,
     catalog: &'a Catalog,
-    memory: MemoryLimit,
 }
 
 /// The report of an image, and whether its files could be written.
@@ -107,9 +105,7 @@ impl Sink for Reports<'_> {
 
     fn make(&self, image: &ImageName, solved: &Solved) -> Report {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
-        let saved = self
-            .files
-            .save(image, solved, &report, self.catalog, self.memory);
+        let saved = self.files.save(image, solved, &report, self.catalog);
         let row = self
             .needs_rows
             .then(|| FrameRow::new(&report, &solved.solution));

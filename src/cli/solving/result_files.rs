@@ -8,35 +8,22 @@ use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
-use starpipe::report::overlay::{self, OverlayOptions, Shown};
+use starpipe::report::overlay::{self, Shown};
 use starpipe::report::{FrameReport, page, regions, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
-use std::path::PathBuf;
 
 /// Writes result files into a directory, if one is given.
-pub(super) struct ResultFiles {
-    directory: Option<PathBuf>,
-    overlay: OverlayOptions,
-    /// Whether pages are wanted.
-    html: bool,
-    /// Whether copies with coordinates are wanted.
-    copy: bool,
-    /// Whether regions are wanted.
-    regions: bool,
+pub(super) struct ResultFiles<'a> {
+    options: &'a OutputOptions,
+    /// For the colors of a frame.
+    memory: MemoryLimit,
 }
 
-impl ResultFiles {
+impl<'a> ResultFiles<'a> {
     /// Makes the directory, if one is given.
-    pub(super) fn new(options: &OutputOptions) -> anyhow::Result<Self> {
-        let directory = options.out.clone();
-        directory.as_deref().map(make_directory).transpose()?;
-        Ok(Self {
-            directory,
-            overlay: options.overlay(),
-            html: options.html,
-            copy: options.write_fits,
-            regions: options.regions,
-        })
+    pub(super) fn new(options: &'a OutputOptions, memory: MemoryLimit) -> anyhow::Result<Self> {
+        options.out.as_deref().map(make_directory).transpose()?;
+        Ok(Self { options, memory })
     }
 
     /// Writes the files of `image`, all or none, and removes the FITS header of an earlier run if
@@ -47,9 +34,12 @@ impl ResultFiles {
         solved: &Solved,
         report: &FrameReport,
         catalog: &Catalog,
-        memory: MemoryLimit,
     ) -> anyhow::Result<()> {
-        let Some(directory) = &self.directory else {
+        let OutputOptions {
+            out: Some(directory),
+            ..
+        } = self.options
+        else {
             return Ok(());
         };
         let path = |extension: &str| output_path(directory, image.path, image.page, extension);
@@ -62,24 +52,27 @@ impl ResultFiles {
         let title = name.file_name().unwrap_or(name.as_os_str());
         let title = title.to_string_lossy();
         let frame = solved.frame.as_ref();
-        let colors = frame.and_then(|frame| colors(image, frame, memory));
+        let overlay = self.options.overlay();
+        let colors = frame
+            .filter(|_| overlay.has_colors())
+            .and_then(|frame| self.colors(image, frame));
         let shown = frame.map(|frame| {
             let mut shown = Shown::new(&title, frame);
             shown.colors = colors.as_ref();
             shown
         });
         if let Some(shown) = &shown {
-            let picture = overlay::png(shown, &solved.solution, catalog, &self.overlay)?;
+            let picture = overlay::png(shown, &solved.solution, catalog, &overlay)?;
             files.push((path("png"), picture));
         }
-        if self.html {
-            let page = page::html(report, &solved.solution, shown.as_ref(), &self.overlay)?;
+        if self.options.html {
+            let page = page::html(report, &solved.solution, shown.as_ref(), &overlay)?;
             files.push((path("html"), page.into_bytes()));
         }
-        if self.regions {
+        if self.options.regions {
             files.push((path("reg"), regions::ds9(report).into_bytes()));
         }
-        if let Some(frame) = frame.filter(|_| self.copy) {
+        if let Some(frame) = frame.filter(|_| self.options.write_fits) {
             let copy = wcs::solved_copy(&report.frame, frame, &solved.solution)?;
             files.extend(copy.map(|copy| (path("solved.fits"), copy)));
         }
@@ -98,16 +91,16 @@ impl ResultFiles {
         }
         Ok(())
     }
-}
 
-/// The colors of an image, if it is the only one of a file.
-fn colors(image: &ImageName, frame: &Frame, memory: MemoryLimit) -> Option<Colors> {
-    if image.page.is_some() || is_stdin(image.path) {
-        return None;
+    /// The colors of an image, if it is the only one of a file.
+    fn colors(&self, image: &ImageName, frame: &Frame) -> Option<Colors> {
+        if image.page.is_some() || is_stdin(image.path) {
+            return None;
+        }
+        let mut buffers = Buffers::new();
+        buffers.set_memory(self.memory);
+        Colors::read(image.path, frame, &mut buffers)
     }
-    let mut buffers = Buffers::new();
-    buffers.set_memory(memory);
-    Colors::read(image.path, frame, &mut buffers)
 }
 
 /// The stars of `report` as CSV.

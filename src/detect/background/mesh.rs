@@ -172,25 +172,25 @@ impl Mesh {
             grid,
             background,
             sigma,
-            slope_sigma,
             smoother,
             ..
         } = self;
         smoother.fill_gaps(grid, background, sigma);
         smoother.smooth(grid, background, sigma);
-        for slopes in slope_sigma {
-            for (slope, sigma) in slopes
-                .iter_mut()
-                .zip(sigma.iter())
-                .filter(|(v, _)| v.is_nan())
-            {
-                *slope = *sigma;
-            }
-            smoother.smooth_noise(grid, slopes);
-            raise(slopes, self.sigma_floor);
-        }
         raise(sigma, self.sigma_floor);
         self.set_pieces();
+    }
+
+    /// Completes the noise from slopes after [`Self::finish`], where it was measured: gaps, smoothing.
+    pub fn finish_slopes(&mut self) {
+        for slopes in &mut self.slope_sigma {
+            let gaps = slopes.iter_mut().zip(&self.sigma);
+            for (slope, sigma) in gaps.filter(|(slope, _)| slope.is_nan()) {
+                *slope = *sigma;
+            }
+            self.smoother.smooth_noise(&self.grid, slopes);
+            raise(slopes, self.sigma_floor);
+        }
     }
 
     /// Whether the background has an edge somewhere: a place where it bends by at least a `share` of how

@@ -117,6 +117,7 @@ impl FilteredFrame {
         view.check()?;
         check_count(total.into_inner(), gathered.most)?;
         mesh.finish();
+        mesh.finish_slopes();
         Ok(())
     }
 

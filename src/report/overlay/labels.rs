@@ -188,9 +188,9 @@ mod tests {
         }
     }
 
-    fn rectangle(label: &Label) -> Rectangle {
-        let [x, y] = label.at;
-        [x, y - CAPITALS * SIZE, x + text_width(&label.text, SIZE), y]
+    fn rectangle(label: &Label, unit: f32) -> Rectangle {
+        let ([x, y], size) = (label.at, SIZE * unit);
+        [x, y - CAPITALS * size, x + text_width(&label.text, size), y]
     }
 
     /// A frame with `count` stars, of which some have names.
@@ -224,16 +224,11 @@ mod tests {
             let (shown, labels) = place(&marks, rings, image, unit);
             assert!(rings != Rings::Named || labels.len() == shown.len());
             placed += labels.len();
-            let rectangle = |label: &Label| {
-                let [x, y] = label.at;
-                let size = SIZE * unit;
-                [x, y - CAPITALS * size, x + text_width(&label.text, size), y]
-            };
             for (i, label) in labels.iter().enumerate() {
-                let own = rectangle(label);
+                let own = rectangle(label, unit);
                 assert!(lies_within(&own, image));
                 let mut before = labels[..i].iter();
-                assert!(before.all(|other| !overlap(&own, &rectangle(other))));
+                assert!(before.all(|other| !overlap(&own, &rectangle(other, unit))));
                 let hidden = shown.iter().find(|m| m.is_covered_by(&own));
                 assert!(hidden.is_none(), "frame {frame}: {label:?}");
             }
@@ -252,7 +247,7 @@ mod tests {
         ] {
             let (_, labels) = place(&[mark(x, y, 1.0)], Rings::All, IMAGE, 1.0);
             assert_eq!(labels.len(), 1, "({x}, {y})");
-            assert!(lies_within(&rectangle(&labels[0]), IMAGE));
+            assert!(lies_within(&rectangle(&labels[0], 1.0), IMAGE));
         }
     }
 

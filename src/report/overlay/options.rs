@@ -10,6 +10,13 @@ pub struct OverlayOptions {
     pub rings: Rings,
 }
 
+impl OverlayOptions {
+    /// Whether a frame is drawn in its own colors.
+    pub fn has_colors(&self) -> bool {
+        self.stretch != Stretch::Hard
+    }
+}
+
 /// How a frame becomes a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]

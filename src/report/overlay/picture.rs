@@ -5,7 +5,7 @@ use super::shown::Shown;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::BackgroundMap;
-use crate::frame::{Colors, Frame, LUMINANCE_WEIGHTS};
+use crate::frame::{Colors, Frame, luminance};
 use crate::pipeline::Background;
 #[cfg(feature = "page")]
 use image::RgbImage;
@@ -176,20 +176,13 @@ fn photograph(
     let Some(colors) = colors else {
         let light = squares.light();
         let curve = Curve::of(&light, squares.frame.step_adu, sky_levels);
-        return grey(
-            &light
-                .iter()
-                .map(|level| curve.apply(*level))
-                .collect::<Vec<_>>(),
-        );
+        let levels: Vec<u8> = light.iter().map(|level| curve.apply(*level)).collect();
+        return grey(&levels);
     };
     let [red, green, blue] = squares.colors(colors);
     let all = red.iter().zip(&green).zip(&blue);
     let pixels: Vec<[f32; 3]> = all.map(|((r, g), b)| [*r, *g, *b]).collect();
-    let luminance = |pixel: &[f32; 3]| -> f32 {
-        let parts = pixel.iter().zip(LUMINANCE_WEIGHTS);
-        parts.map(|(level, weight)| level * weight).sum()
-    };
+    let luminance = |pixel: &[f32; 3]| luminance(*pixel, f32::INFINITY);
     let light: Vec<f32> = pixels.iter().map(luminance).collect();
     let curve = Curve::of(&light, colors.step, sky_levels);
     let color = |pixel: &[f32; 3]| pixel.map(|level| curve.apply(level));
