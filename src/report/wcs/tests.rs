@@ -11,11 +11,11 @@ use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::HashMap;
 
-/// Required agreement, in pixels.
+/// Required agreement of the way from pixels to the sky, in pixels. Nine orders are too few for the
+/// worst of these lenses: of 6000, none is farther off than 0.02.
 const FORWARD_TOLERANCE_PX: f64 = 0.03;
-/// The inverse has at most nine orders, too few for the worst of these lenses: of 8000, none is
-/// farther off.
-const INVERSE_TOLERANCE_PX: f64 = 0.03;
+/// The same for the way back, which is a polynomial in a lens as well.
+const INVERSE_TOLERANCE_PX: f64 = 1e-4;
 
 /// The header's cards by keyword, as text.
 fn cards(header: &[u8]) -> HashMap<String, String> {
@@ -131,7 +131,7 @@ fn camera() -> impl Strategy<Value = CameraModel> {
             let camera = CameraModel::pinhole(width, height, focal * 2.0 * radius_px, mirrored);
             camera.with_distortion(model.map(|model| {
                 // Each coefficient is at most this large: a poor lens.
-                let most_px = 0.02 * radius_px / (model.terms() as f64).sqrt();
+                let most_px = 0.015 * radius_px / (model.terms() as f64).sqrt();
                 let c = coefficients[..model.terms()].iter().map(|c| c * most_px);
                 Distortion::new(model, radius_px, &c.collect::<Vec<f64>>())
             }))
