@@ -3,45 +3,22 @@
 //! # Reference
 //! "Parquet in the VO", IVOA note 2025; VOTable 1.4.
 
-use crate::base::table::{Column, FieldValue};
-use std::fmt::Write as _;
+use crate::base::table::Column;
+use crate::report::tables::votable::{SIZE, with_data};
 
 /// Keys of the metadata of a Parquet file.
 pub const VERSION_KEY: &str = "IVOA.VOTable-Parquet.version";
 pub const CONTENT_KEY: &str = "IVOA.VOTable-Parquet.content";
 pub const VERSION: &str = "1.0";
 
-/// Comes before the size of a text.
-const SIZE: &str = "arraysize=\"";
-
-/// The VOTable of `columns`; `widths` are the characters of the longest text in each. The size is
-/// fixed, since astropy cannot stack columns of texts of any size.
+/// The VOTable of `columns`; `widths` are the characters of the longest text in each.
 pub fn votable<R>(table: &str, columns: &[Column<R>], widths: &[usize]) -> String {
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <VOTABLE version=\"1.4\" xmlns=\"http://www.ivoa.net/xml/VOTable/v1.3\">\n\
-         <RESOURCE type=\"results\">\n<TABLE name=\"{table}\">\n"
-    );
-    for (column, width) in columns.iter().zip(widths) {
-        let name = column.name;
-        let kind = match column.empty {
-            FieldValue::Integer(_) => "datatype=\"long\"".to_owned(),
-            FieldValue::Number(_) => "datatype=\"double\"".to_owned(),
-            FieldValue::Bool(_) => "datatype=\"boolean\"".to_owned(),
-            FieldValue::Text(_) => {
-                format!("datatype=\"unicodeChar\" {SIZE}{}\"", width.max(&1))
-            }
-        };
-        let _ = write!(text, "<FIELD ID=\"{name}\" name=\"{name}\" {kind}");
-        for (key, value) in [("unit", column.meaning.unit), ("ucd", column.meaning.ucd)] {
-            if !value.is_empty() {
-                let _ = write!(text, " {key}=\"{value}\"");
-            }
-        }
-        let description = column.meaning.description;
-        let _ = writeln!(text, "><DESCRIPTION>{description}</DESCRIPTION></FIELD>");
-    }
-    text + "<PARQUET type=\"Parquet-local-XML\"/>\n</TABLE>\n</RESOURCE>\n</VOTABLE>\n"
+    with_data(
+        table,
+        columns,
+        widths,
+        "<PARQUET type=\"Parquet-local-XML\"/>\n",
+    )
 }
 
 /// The VOTable of two tables with the same columns in one: texts have the larger size.

@@ -17,8 +17,16 @@ pub enum FieldValue {
 }
 
 impl FieldValue {
+    /// The text, if it is one.
+    pub(crate) fn into_text(self) -> Option<String> {
+        match self {
+            Self::Text(text) => text,
+            _ => None,
+        }
+    }
+
     /// The value as CSV has it.
-    fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         /// Smaller numbers have an exponent.
         const MIN_WITHOUT_EXPONENT: f64 = 1e-4;
         match self {
@@ -105,6 +113,7 @@ pub(crate) use field;
 field! {
     // Keeps the bits: a seed may have all 64 of them.
     u64 => Integer, |value| value.cast_signed();
+    u32 => Integer, |value| i64::from(*value);
     f64 => Number, |value| *value;
     bool => Bool, |value| *value;
     Vec<&'static str> => Text, |value| value.join(" ");

@@ -91,7 +91,7 @@ fn save_overlay(
     };
     let title = format!("{}, simulated", name.display());
     let options = OverlayOptions::default();
-    let picture = overlay::png(
+    let picture = overlay::encoded(
         &Shown::new(&title, frame),
         solution,
         indexed.catalog(),

@@ -10,13 +10,13 @@ use memchr::memmem;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Keyword and value of the PNG text that marks an overlay.
+/// Keyword and value of the PNG text that marks an overlay; the value is the comment of a JPEG.
 pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
 /// The files in `directory` that begin like an image or are named as one, sorted by name.
 ///
 /// Left out are subdirectories and products of starpipe: overlays ([`is_overlay`]), calibration
-/// frames ([`is_calibration_frame`]), copies of frames ([`is_copy`]) and headers without an image (`.wcs`). A file that cannot be
+/// frames ([`is_calibration_frame`]), copies of frames ([`is_copy`]), tables ([`is_table`]) and headers without an image (`.wcs`). A file that cannot be
 /// opened or is empty or damaged is listed, so that reading it reports the error.
 /// # Errors
 /// [`FrameError::File`] with the directory and [`FrameError::Io`] or [`FrameError::NoFrames`]; without
@@ -65,8 +65,15 @@ fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
 /// starpipe.
 pub fn is_overlay(head: &[u8]) -> bool {
     let (keyword, text) = OVERLAY_TEXT;
-    let chunk = [b"tEXt", keyword.as_bytes(), b"\0", text.as_bytes()].concat();
-    FrameFormat::of(head) == Some(FrameFormat::Png) && memmem::find(head, &chunk).is_some()
+    let mark = match FrameFormat::of(head) {
+        Some(FrameFormat::Png) => [b"tEXt", keyword.as_bytes(), b"\0", text.as_bytes()].concat(),
+        // A comment.
+        Some(FrameFormat::Jpeg) => {
+            [&[0xff, 0xfe, 0, text.len() as u8 + 2], text.as_bytes()].concat()
+        }
+        _ => return false,
+    };
+    memmem::find(head, &mark).is_some()
 }
 
 /// Beginning of the CREATOR keyword that marks a calibration frame.
@@ -84,6 +91,14 @@ pub const COPY_CREATOR: &str = "starpipe copy";
 /// Whether the file that begins with `head` is a copy of a frame, written by starpipe.
 pub fn is_copy(head: &[u8]) -> bool {
     is_created_by(head, COPY_CREATOR)
+}
+
+/// Beginning of the CREATOR keyword that marks a table.
+pub const TABLE_CREATOR: &str = "starpipe table";
+
+/// Whether the file that begins with `head` is a table in FITS, written by starpipe.
+pub fn is_table(head: &[u8]) -> bool {
+    is_created_by(head, TABLE_CREATOR)
 }
 
 fn is_created_by(head: &[u8], creator: &str) -> bool {
@@ -111,8 +126,10 @@ fn is_listed(path: &Path) -> io::Result<bool> {
     }
     let head = head_of(path)?;
     Ok(match FrameFormat::of(&head) {
-        Some(FrameFormat::Png) => !is_overlay(&head),
-        Some(FrameFormat::Fits) => !is_calibration_frame(&head) && !is_copy(&head),
+        Some(FrameFormat::Png | FrameFormat::Jpeg) => !is_overlay(&head),
+        Some(FrameFormat::Fits) => {
+            !is_calibration_frame(&head) && !is_copy(&head) && !is_table(&head)
+        }
         Some(format) if format.is_compressed() => {
             let (known, inside) = format_inside(&head, format);
             // As in `night.fits.bz2`.

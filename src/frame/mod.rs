@@ -64,7 +64,8 @@ pub use columns::DefectiveColumn;
 pub(crate) use directory::OVERLAY_TEXT;
 #[doc(hidden)]
 pub use directory::{
-    CALIBRATION_CREATOR, COPY_CREATOR, files_in, is_calibration_frame, is_copy, is_overlay,
+    CALIBRATION_CREATOR, COPY_CREATOR, TABLE_CREATOR, files_in, is_calibration_frame, is_copy,
+    is_overlay, is_table,
 };
 pub use error::FrameError;
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};

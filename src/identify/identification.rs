@@ -1,6 +1,6 @@
 //! The result of identification.
 
-use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::CameraModel;
 use crate::identify::field::SourceIndex;
 use crate::sky::catalog::StarIndex;
@@ -62,6 +62,17 @@ impl Identification {
         self.focal_length_sigma_px = self
             .focal_length_sigma_px
             .hypot(along * self.camera.central_focal_length_px());
+    }
+
+    /// Where the camera sees what appears in this direction; `None` if it does not.
+    pub fn pixel_of(&self, apparent: &UnitVector<Icrs>) -> Option<PixelPoint> {
+        self.camera.pixel_of(&self.icrs_to_camera.apply(apparent))
+    }
+
+    /// The direction in which a pixel's light appears; `None` outside the lens's field.
+    pub fn apparent_direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
+        let direction = self.camera.direction_of(pixel)?;
+        Some(self.icrs_to_camera.inverse().apply(&direction))
     }
 
     /// The attitude relative to these directions.

@@ -22,11 +22,7 @@ impl BodyInFrame {
     /// Where `body` is expected; `None` outside the frame.
     pub(super) fn expected(body: Body, found: &Identification) -> Option<Self> {
         let camera = &found.camera;
-        let position = camera.pixel_of(
-            &found
-                .icrs_to_camera
-                .apply(&found.places.apparent(&body.direction)),
-        )?;
+        let position = found.pixel_of(&found.places.apparent(&body.direction))?;
         let disc_px = body.radius_rad * camera.focal_length_px();
         camera.nearly_contains(&position, disc_px).then_some(Self {
             body,

@@ -1,5 +1,6 @@
 //! The report of a frame: its fields, as JSON has them.
 
+use crate::base::coords::PixelPoint;
 use crate::base::format::json_escaped;
 use crate::base::remedy::Remedy;
 use crate::frame::RowOrder;
@@ -430,6 +431,18 @@ pub struct StarReport {
     pub id: Option<String>,
     /// Its name, if it has one; that of the Moon or a planet, without `id`.
     pub name: Option<String>,
+    /// Its number in the Hipparcos Catalogue, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hip: Option<u32>,
+    /// Its number in the Henry Draper Catalogue, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hd: Option<u32>,
+    /// Its number in the Bright Star Catalogue, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hr: Option<u32>,
+    /// Its number in the SAO catalogue, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sao: Option<u32>,
     /// Its Johnson V magnitude.
     pub vmag: Option<f64>,
     /// Right ascension (ICRS) of the star at the frame's date, or of the detection where no star is
@@ -471,6 +484,18 @@ pub struct TimingReport {
 }
 
 impl FrameReport {
+    /// Where a pixel is in the rows of the file, counted from 1 as in FITS.
+    pub(super) fn file_pixel(&self, pixel: &PixelPoint) -> [f64; 2] {
+        let bottom_up = self.row_order == Some(RowOrder::BottomUp);
+        let from_top = pixel.y + 1.0;
+        let y = if bottom_up {
+            self.height as f64 + 1.0 - from_top
+        } else {
+            from_top
+        };
+        [pixel.x + 1.0, y]
+    }
+
     /// The report as one line of JSON, without the line's end.
     ///
     /// # Errors

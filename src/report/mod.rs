@@ -27,6 +27,7 @@ pub mod regions;
 mod sample;
 mod star_row;
 mod stars;
+pub mod tables;
 #[cfg(test)]
 mod tests;
 mod text;

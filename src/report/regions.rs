@@ -7,7 +7,7 @@
 //! SAOImage DS9 reference manual, "Regions".
 
 use super::frame_report::{FrameReport, StarReport};
-use crate::frame::RowOrder;
+use crate::base::coords::PixelPoint;
 use std::fmt::Write;
 
 /// The first line, by which DS9 knows the format.
@@ -18,14 +18,8 @@ pub const FIRST_LINE: &str = "# Region file format: DS9 version 4.1";
 /// not shaped like stars.
 pub fn ds9(report: &FrameReport) -> String {
     let mut text = format!("{FIRST_LINE}\nglobal color=cyan width=1\nimage\n");
-    let bottom_up = report.row_order == Some(RowOrder::BottomUp);
     for star in &report.stars {
-        let x = star.x + 1.0;
-        let y = if bottom_up {
-            report.height as f64 - star.y
-        } else {
-            star.y + 1.0
-        };
+        let [x, y] = report.file_pixel(&PixelPoint::new(star.x, star.y));
         // Writing to a string does not fail.
         let _ = writeln!(text, "{}", region(star, x, y));
     }
@@ -48,6 +42,7 @@ fn region(star: &StarReport, x: f64, y: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::RowOrder;
     use crate::identify::SearchFailure;
     use crate::pipeline::{Outcome, Reason};
     use crate::report::sample;

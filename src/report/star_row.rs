@@ -33,6 +33,10 @@ impl StarRow {
             star.snr, "", "stat.snr", "flux over its standard error";
             star.id, "", "meta.id;meta.main", "identifier in the catalogue";
             star.name, "", "meta.id", "proper name and designation";
+            star.hip, "", "meta.id", "number in the Hipparcos Catalogue";
+            star.hd, "", "meta.id", "number in the Henry Draper Catalogue";
+            star.hr, "", "meta.id", "number in the Bright Star Catalogue";
+            star.sao, "", "meta.id", "number in the SAO catalogue";
             star.vmag, "mag", "phot.mag;em.opt.V", "Johnson V of the named star";
             star.ra_deg, "deg", "pos.eq.ra;meta.main", "right ascension at the frame's date (ICRS)";
             star.dec_deg, "deg", "pos.eq.dec;meta.main", "declination at the frame's date (ICRS)";
@@ -98,6 +102,10 @@ mod tests {
             snr: Some(102.9),
             id: Some("HIP 32349".to_owned()),
             name: Some("Sirius".to_owned()),
+            hip: Some(32_349),
+            hd: Some(48_915),
+            hr: Some(2491),
+            sao: Some(151_881),
             vmag: Some(-1.44),
             ra_deg: Some(101.287),
             dec_deg: Some(-16.716),

@@ -47,10 +47,8 @@ impl ReportedPointing<'_> {
     /// Adds right ascension and declination to all detections, and its star to each named one.
     pub(super) fn add_to(&self, stars: &mut [StarReport], catalog: &Catalog) {
         for star in stars.iter_mut() {
-            let to_icrs = self.identification.icrs_to_camera.inverse();
             let pixel = PixelPoint::new(star.x, star.y);
-            if let Some(direction) = self.identification.camera.direction_of(&pixel) {
-                let apparent = to_icrs.apply(&direction);
+            if let Some(apparent) = self.identification.apparent_direction_of(&pixel) {
                 let places = &self.identification.places;
                 star.set_direction(&places.astrometric(&apparent));
                 star.airmass = places
@@ -73,6 +71,9 @@ impl ReportedPointing<'_> {
         let apparent = places.apparent(&direction);
         star.id = Some(catalog.designation(star_match.star));
         star.name = catalog.full_name(star_match.star);
+        let numbers = catalog.numbers_of(star_match.star);
+        (star.hip, star.hd) = (numbers.hip, numbers.hd);
+        (star.hr, star.sao) = (numbers.hr, numbers.sao);
         star.vmag = finite(f64::from(known.v_mag), 3);
         star.residual_px = self.residual_px(star, &apparent);
         star.p_chance = significant(star_match.p_chance, CHANCE_DIGITS);
@@ -86,12 +87,7 @@ impl ReportedPointing<'_> {
 
     /// Distance of a detection from what appears in this direction, in pixels.
     fn residual_px(&self, star: &StarReport, direction: &UnitVector<Icrs>) -> Option<f64> {
-        let Identification {
-            camera,
-            icrs_to_camera,
-            ..
-        } = self.identification;
-        let predicted = camera.pixel_of(&icrs_to_camera.apply(direction))?;
+        let predicted = self.identification.pixel_of(direction)?;
         let distance_px = predicted.distance_to(&PixelPoint::new(star.x, star.y));
         finite(distance_px, PIXEL_DECIMALS)
     }

@@ -50,6 +50,93 @@ fn the_overlay_is_a_picture_of_the_frame_and_the_header_has_its_size() {
 }
 
 #[test]
+fn an_overlay_is_of_the_kind_and_width_that_are_wanted() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path();
+    let draw = |format: &str, more: &[&str]| {
+        let mut command = starpipe();
+        command.args([
+            "process",
+            "--overlay-width",
+            "500",
+            "--overlay-format",
+            format,
+        ]);
+        Ran::new(command.args(more).arg("--out").args([out, &orion()]))
+    };
+    let all = "constellations,deep-sky,grid,altaz-grid";
+    let more = [
+        "--draw",
+        all,
+        "--label",
+        "hd",
+        "--date",
+        "2024-01-05T22:00Z",
+        "--site",
+        "52,5",
+    ];
+    assert_eq!(draw("svg", &more).status, 0);
+    let svg = fs::read_to_string(out.join("orion.svg")).unwrap();
+    for text in [
+        "width=\"500\"",
+        ">HD 37742 ",
+        ">M 42<",
+        ">0°<",
+        ">5h40m<",
+        ">alt ",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
+    assert_eq!(draw("jpg", &[]).status, 0);
+    let picture = image::open(out.join("orion.jpg")).unwrap();
+    assert_eq!(picture.width(), 500);
+    assert!(!out.join("orion.png").exists());
+    // A directory of frames does not have them.
+    fs::copy(orion(), out.join("frame.png")).unwrap();
+    let listed = Ran::new(starpipe().args(["process", "--format", "json"]).arg(out));
+    assert_eq!(listed.reports().len(), 1, "{}", listed.stderr);
+    // Files that starpipe did not draw stay.
+    fs::write(out.join("orion.svg"), "<svg/>").unwrap();
+    let refused = draw("svg", &[]);
+    assert_eq!(refused.status, 2, "{}", refused.stderr);
+    assert!(refused.stderr.contains("orion.svg"), "{}", refused.stderr);
+}
+
+#[test]
+fn a_quiet_run_prints_errors_only() {
+    let directory = tempfile::tempdir().unwrap();
+    let out = directory.path();
+    let (orion, missing) = (orion(), out.join("missing.tif"));
+    let mut command = starpipe();
+    command.args([
+        "process",
+        "-q",
+        "--stars",
+        "fits,votable,ecsv,corr,rdls",
+        "--out",
+    ]);
+    let ran = Ran::new(command.args([out, &orion, &missing]));
+    assert_eq!((ran.status, ran.stdout.as_str()), (1, ""));
+    assert!(
+        ran.stderr.contains("missing.tif") && ran.stderr.lines().count() == 1,
+        "{}",
+        ran.stderr
+    );
+    let expected = [
+        "orion.corr",
+        "orion.csv",
+        "orion.json",
+        "orion.png",
+        "orion.rdls",
+        "orion.stars.ecsv",
+        "orion.stars.fits",
+        "orion.stars.vot",
+        "orion.wcs",
+    ];
+    assert_eq!(names(out), expected);
+}
+
+#[test]
 fn a_frame_that_is_not_identified_has_no_header_left_from_before() {
     let directory = tempfile::tempdir().unwrap();
     let frame = directory.path().join("frame.png");

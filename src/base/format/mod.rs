@@ -60,6 +60,13 @@ pub fn json_escaped(json: String) -> String {
     escaped
 }
 
+/// Text between the tags of XML.
+pub(crate) fn xml_escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
 /// A name or other text in a cell of a CSV table, on one line, and never a formula to a spreadsheet:
 /// if it begins like one, an apostrophe stands before it.
 pub fn table_name(text: &str) -> String {

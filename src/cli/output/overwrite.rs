@@ -5,7 +5,7 @@ use crate::cli::exit::CommandError;
 use anyhow::bail;
 use starpipe::base::files;
 use starpipe::frame;
-use starpipe::report::{page, regions, wcs};
+use starpipe::report::{overlay, page, regions, tables, wcs};
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
 use std::fs;
@@ -127,8 +127,13 @@ fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
     match extension {
         "json" => head.starts_with(b"{\"schema\":"),
         "csv" => head.starts_with(b"frame,x,y,") || head.starts_with(b"x,y,level_adu,"),
-        "fits" => frame::is_calibration_frame(head) || frame::is_copy(head),
-        "png" => frame::is_overlay(head),
+        "fits" => {
+            frame::is_calibration_frame(head) || frame::is_copy(head) || frame::is_table(head)
+        }
+        "corr" | "rdls" => frame::is_table(head),
+        "vot" | "ecsv" => tables::is_text_table(head),
+        "png" | "jpg" => frame::is_overlay(head),
+        "svg" => overlay::is_svg(head),
         "html" => page::is_page(head),
         "reg" => head.starts_with(regions::FIRST_LINE.as_bytes()),
         _ => wcs::is_header(head),

@@ -20,12 +20,9 @@ pub(crate) enum Inputs {
 }
 
 impl Inputs {
-    /// Extensions of the result files of an image.
-    pub(super) fn result_extensions(&self) -> &'static [&'static str] {
-        match self {
-            Self::Frames(_) => &["json", "csv", "png", "wcs"],
-            Self::Lists(_) => &["json", "csv", "wcs"],
-        }
+    /// Whether there are frames to draw.
+    pub(super) fn have_pictures(&self) -> bool {
+        matches!(self, Self::Frames(_))
     }
 }
 

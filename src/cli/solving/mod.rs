@@ -4,6 +4,7 @@
 mod frame_table;
 mod images;
 pub(crate) mod options;
+mod overlay_args;
 mod printer;
 mod reports;
 mod result_files;

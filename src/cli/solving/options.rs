@@ -1,5 +1,6 @@
 //! Options of `process` and `identify`.
 
+use super::overlay_args::OverlayArgs;
 use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::hints::HintOptions;
@@ -7,7 +8,7 @@ use crate::cli::options::values;
 use clap::{Args, ValueEnum};
 use starpipe::identify::{Effort, NAME_ODDS};
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
-use starpipe::report::overlay::{OverlayOptions, Rings, Stretch};
+use starpipe::report::tables::TableFormat;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -77,10 +78,13 @@ pub(super) struct OutputOptions {
     #[arg(long, value_enum)]
     pub(super) format: Option<ReportFormat>,
     /// With --format text, list every identified star and not just the brightest
-    #[arg(long)]
+    #[arg(short = 'v', long, visible_alias = "verbose")]
     pub(super) all_stars: bool,
+    /// Print errors only: no reports, no progress, no summary
+    #[arg(short, long, conflicts_with_all = ["format", "all_stars"])]
+    pub(super) quiet: bool,
     /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header,
-    /// if the frame is identified) and, for frames, FRAME.png (the stars marked and named)
+    /// if the frame is identified) and, for frames, FRAME.png (a picture with the stars marked and named)
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
     /// With --out, also write FRAME.html: a page with the answer, the picture, figures and a table, to look at
@@ -94,62 +98,64 @@ pub(super) struct OutputOptions {
     /// With --out, also write FRAME.reg: the detections as regions for SAOImage DS9
     #[arg(long, requires = "out")]
     pub(super) regions: bool,
-    /// How FRAME.png shows the frame
-    #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
-    stretch: StretchOption,
-    /// Which detections FRAME.png marks
-    #[arg(long, value_enum, default_value_t = RingsOption::Named, requires = "out")]
-    rings: RingsOption,
+    /// With --out, also write the detections as these tables, separated by commas
+    #[arg(
+        long,
+        value_enum,
+        value_name = "KIND",
+        value_delimiter = ',',
+        requires = "out"
+    )]
+    stars: Vec<TableOption>,
+    #[command(flatten)]
+    pub(super) overlay: OverlayArgs,
 }
 
-/// How an overlay shows the frame.
+/// Kinds of tables.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum StretchOption {
-    /// In proportion to its levels
-    None,
-    /// With a dark sky brightened
-    Soft,
-    /// Without its background, so that faint stars show
-    Hard,
-}
-
-/// Which detections an overlay marks.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum RingsOption {
-    /// The brightest identified stars, with their names; all where the frame is not identified
-    Named,
-    /// All
-    All,
-    /// None
-    None,
+enum TableOption {
+    /// FRAME.stars.fits: a binary table of FITS
+    Fits,
+    /// FRAME.stars.vot: a VOTable
+    Votable,
+    /// FRAME.stars.ecsv: Enhanced CSV, as astropy reads it
+    Ecsv,
+    /// FRAME.corr: pairs of detections and stars, as astrometry.net writes them
+    Corr,
+    /// FRAME.rdls: directions of the identified stars, as astrometry.net writes them
+    Rdls,
 }
 
 impl OutputOptions {
-    /// Extensions of the result files that are written where they are asked for.
-    pub(super) fn further_extensions(&self) -> Vec<&'static str> {
-        let asked = [
+    /// The tables that are wanted.
+    pub(super) fn tables(&self) -> Vec<TableFormat> {
+        let format = |option: &TableOption| match option {
+            TableOption::Fits => TableFormat::Fits,
+            TableOption::Votable => TableFormat::VoTable,
+            TableOption::Ecsv => TableFormat::Ecsv,
+            TableOption::Corr => TableFormat::Corr,
+            TableOption::Rdls => TableFormat::Rdls,
+        };
+        self.stars.iter().map(format).collect()
+    }
+
+    /// Extensions of the result files of an image.
+    pub(super) fn result_extensions(&self, has_picture: bool) -> Vec<&'static str> {
+        let all = [
+            (true, "json"),
+            (true, "csv"),
+            (true, "wcs"),
+            (has_picture, self.overlay.options().format.extension()),
             (self.html, "html"),
             (self.write_fits, "solved.fits"),
             (self.regions, "reg"),
         ];
-        let wanted = asked.into_iter().filter(|(is_wanted, _)| *is_wanted);
-        wanted.map(|(_, extension)| extension).collect()
-    }
-
-    /// How to draw overlays.
-    pub(super) fn overlay(&self) -> OverlayOptions {
-        let mut options = OverlayOptions::default();
-        options.stretch = match self.stretch {
-            StretchOption::None => Stretch::None,
-            StretchOption::Soft => Stretch::Soft,
-            StretchOption::Hard => Stretch::Hard,
-        };
-        options.rings = match self.rings {
-            RingsOption::Named => Rings::Named,
-            RingsOption::All => Rings::All,
-            RingsOption::None => Rings::None,
-        };
-        options
+        let wanted = all.into_iter().filter(|(is_wanted, _)| *is_wanted);
+        let tables = self.tables().into_iter().map(TableFormat::extension);
+        wanted
+            .map(|(_, extension)| extension)
+            .chain(tables)
+            .collect()
     }
 }
 

@@ -15,6 +15,7 @@ use std::ops::ControlFlow;
 
 /// Prints reports as they come.
 pub(super) struct Printer {
+    is_quiet: bool,
     format: ReportFormat,
     text: TextOptions,
     reports: usize,
@@ -34,6 +35,7 @@ impl Printer {
             ReportFormat::Text
         };
         Self {
+            is_quiet: options.quiet,
             format: options.format.unwrap_or(usual),
             text,
             reports: 0,
@@ -52,6 +54,9 @@ impl Printer {
         report: &FrameReport,
         row: Option<&FrameRow>,
     ) -> anyhow::Result<ControlFlow<()>> {
+        if self.is_quiet {
+            return Ok(ControlFlow::Continue(()));
+        }
         let is_first = self.reports == 0;
         self.reports += 1;
         self.summary.add(report);
@@ -60,7 +65,7 @@ impl Printer {
 
     /// Prints what follows the last report.
     pub(super) fn finish(&mut self, tally: &Tally) -> anyhow::Result<ControlFlow<()>> {
-        if self.format != ReportFormat::Table {
+        if self.is_quiet || self.format != ReportFormat::Table {
             return Ok(ControlFlow::Continue(()));
         }
         print(&self.summary.text(tally))

@@ -50,14 +50,14 @@ pub(crate) fn report_all(
         output, catalog, ..
     } = options;
     if let Some(directory) = &output.out {
-        let extensions = [inputs.result_extensions(), &output.further_extensions()].concat();
+        let extensions = output.result_extensions(inputs.have_pictures());
         overwrite::check(paths, directory, &extensions)?;
     }
     let mut run = Run {
         printer: Printer::new(&output, paths.len()),
         progress: match paths.len() {
-            0 | 1 => ProgressBar::hidden(),
-            count => frames_bar(count as u64),
+            count if count > 1 && !output.quiet => frames_bar(count as u64),
+            _ => ProgressBar::hidden(),
         },
         tally: Tally::default(),
     };

@@ -9,7 +9,7 @@ use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
 use starpipe::report::overlay::{self, Shown};
-use starpipe::report::{FrameReport, page, regions, wcs, write_table_header};
+use starpipe::report::{FrameReport, page, regions, tables, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 
 /// Writes result files into a directory, if one is given.
@@ -52,7 +52,7 @@ impl<'a> ResultFiles<'a> {
         let title = name.file_name().unwrap_or(name.as_os_str());
         let title = title.to_string_lossy();
         let frame = solved.frame.as_ref();
-        let overlay = self.options.overlay();
+        let overlay = self.options.overlay.options();
         let colors = frame
             .filter(|_| overlay.has_colors())
             .and_then(|frame| self.colors(image, frame));
@@ -62,12 +62,16 @@ impl<'a> ResultFiles<'a> {
             shown
         });
         if let Some(shown) = &shown {
-            let picture = overlay::png(shown, &solved.solution, catalog, &overlay)?;
-            files.push((path("png"), picture));
+            let picture = overlay::encoded(shown, &solved.solution, catalog, &overlay)?;
+            files.push((path(overlay.format.extension()), picture));
         }
         if self.options.html {
             let page = page::html(report, &solved.solution, shown.as_ref(), &overlay)?;
             files.push((path("html"), page.into_bytes()));
+        }
+        for format in self.options.tables() {
+            let table = tables::stars(report, &solved.solution, format);
+            files.push((path(format.extension()), table));
         }
         if self.options.regions {
             files.push((path("reg"), regions::ds9(report).into_bytes()));

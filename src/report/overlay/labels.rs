@@ -1,6 +1,6 @@
 //! Places names, brightest stars first, where they cover neither another name nor what is marked.
 
-use super::canvas::text_width;
+use super::letters::text_width;
 use super::mark::Mark;
 use super::names::StarLabel;
 use super::options::Rings;
@@ -12,6 +12,8 @@ pub(super) const SIZE: f32 = 12.5;
 const CAPITALS: f32 = 0.74;
 /// Space around a name.
 const MARGIN: f32 = 2.0;
+/// Distance of a name from its ring.
+const GAP: f32 = 3.0;
 
 /// A name and the start of its baseline, in pixels.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,14 +44,67 @@ impl Mark {
     }
 }
 
+/// Where names may still be written.
+pub(super) struct Room<'a> {
+    marked: Vec<&'a Mark>,
+    taken: Vec<Rectangle>,
+    image: [f32; 2],
+    unit: f32,
+}
+
+impl<'a> Room<'a> {
+    /// The marks that are shown.
+    pub(super) fn marked(&self) -> &[&'a Mark] {
+        &self.marked
+    }
+
+    /// A free place beside a circle, for the start of the baseline of `text` in letters of `size` units.
+    pub(super) fn beside(
+        &mut self,
+        text: &str,
+        center: [f32; 2],
+        radius: f32,
+        size: f32,
+    ) -> Option<[f32; 2]> {
+        let gap = GAP * self.unit;
+        let sides = candidates(center, radius + gap, self.extent(text, size), self.unit);
+        self.take(&sides)
+    }
+
+    /// The same around a point, if it is free.
+    pub(super) fn around(&mut self, text: &str, [x, y]: [f32; 2], size: f32) -> Option<[f32; 2]> {
+        let [width, height] = self.extent(text, size);
+        let (right, down) = (
+            width / 2.0 + MARGIN * self.unit,
+            height / 2.0 + MARGIN * self.unit,
+        );
+        self.take(&[[x - right, y - down, x + right, y + down]])
+    }
+
+    fn extent(&self, text: &str, size: f32) -> [f32; 2] {
+        [
+            text_width(text, size * self.unit),
+            CAPITALS * size * self.unit,
+        ]
+    }
+
+    fn take(&mut self, candidates: &[Rectangle]) -> Option<[f32; 2]> {
+        let is_free =
+            |rectangle: &&Rectangle| is_free(rectangle, &self.marked, &self.taken, self.image);
+        let rectangle = *candidates.iter().find(is_free)?;
+        self.taken.push(rectangle);
+        Some(baseline(&rectangle, self.unit))
+    }
+}
+
 /// Places the names of `marks`, brightest first, on a picture of `image` pixels; returns the marks that are
-/// shown with it.
+/// shown with it, and where there is room for more.
 pub(super) fn place(
     marks: &[Mark],
     rings: Rings,
     image: [f32; 2],
     unit: f32,
-) -> (Vec<&Mark>, Vec<Label>) {
+) -> (Vec<Label>, Room<'_>) {
     let named = brightest_named(marks, rings, image, unit);
     let mut shown: Vec<&Mark> = match rings {
         Rings::None => Vec::new(),
@@ -69,7 +124,13 @@ pub(super) fn place(
             None => {}
         }
     }
-    (shown, labels)
+    let room = Room {
+        marked: shown,
+        taken,
+        image,
+        unit,
+    };
+    (labels, room)
 }
 
 /// The marks with the brightest stars, brightest first: as many as there is room for names. Stars with a
@@ -102,35 +163,40 @@ fn label_of(
     image: [f32; 2],
     unit: f32,
 ) -> Option<(Rectangle, Label)> {
-    /// Distance of a name from its ring, ...
-    const GAP: f32 = 3.0;
-    /// ... and where there is no room beside it, with a line to the ring.
+    /// Distance of a name from its ring where there is no room beside it, with a line to the ring.
     const FAR_GAP: f32 = 16.0;
     let StarLabel { text, .. } = mark.label.as_ref()?;
-    let is_free = |rectangle: &Rectangle| {
-        lies_within(rectangle, image)
-            && !taken.iter().any(|other| overlap(rectangle, other))
-            && !shown.iter().any(|other| other.is_covered_by(rectangle))
-    };
     let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
     let find = |gap: f32| {
-        let mut candidates = candidates(mark, size, gap * unit, unit).into_iter();
-        candidates.find(is_free)
+        let away = mark.radius + gap * unit;
+        let mut candidates = candidates([mark.x, mark.y], away, size, unit).into_iter();
+        candidates.find(|rectangle| is_free(rectangle, shown, taken, image))
     };
     let beside = find(GAP);
     let rectangle = beside.or_else(|| find(FAR_GAP))?;
-    let margin = MARGIN * unit;
     let label = Label {
         text: text.clone(),
-        at: [rectangle[0] + margin, rectangle[3] - margin],
+        at: baseline(&rectangle, unit),
         line: beside.is_none().then(|| mark.line_to(&rectangle)),
     };
     Some((rectangle, label))
 }
 
-/// Positions around a ring, best first: beside it, at its corners, above and below.
-fn candidates(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [Rectangle; 8] {
-    let away = mark.radius + gap;
+/// Whether a name there covers neither another name nor what is marked.
+fn is_free(rectangle: &Rectangle, shown: &[&Mark], taken: &[Rectangle], image: [f32; 2]) -> bool {
+    lies_within(rectangle, image)
+        && !taken.iter().any(|other| overlap(rectangle, other))
+        && !shown.iter().any(|other| other.is_covered_by(rectangle))
+}
+
+/// Where the baseline of the name in a rectangle begins.
+fn baseline(rectangle: &Rectangle, unit: f32) -> [f32; 2] {
+    let margin = MARGIN * unit;
+    [rectangle[0] + margin, rectangle[3] - margin]
+}
+
+/// Positions around a point at a distance, best first: beside it, at its corners, above and below.
+fn candidates(center: [f32; 2], away: f32, [width, height]: [f32; 2], unit: f32) -> [Rectangle; 8] {
     let corner = away * std::f32::consts::FRAC_1_SQRT_2;
     let margin = MARGIN * unit;
     // The centre of the name: offset of the ring's edge, then in half sizes of the name.
@@ -145,8 +211,8 @@ fn candidates(mark: &Mark, [width, height]: [f32; 2], gap: f32, unit: f32) -> [R
         (0.0, away, 0.0, 1.0),
     ]
     .map(|(dx, dy, right, down)| {
-        let x = mark.x + dx + right * width / 2.0;
-        let y = mark.y + dy + down * height / 2.0;
+        let x = center[0] + dx + right * width / 2.0;
+        let y = center[1] + dy + down * height / 2.0;
         [
             x - width / 2.0 - margin,
             y - height / 2.0 - margin,
@@ -221,8 +287,23 @@ mod tests {
             let count = random.random_range(1..700);
             let marks = random_marks(&mut random, count, image);
             let rings = [Rings::Named, Rings::All, Rings::None][frame % 3];
-            let (shown, labels) = place(&marks, rings, image, unit);
-            assert!(rings != Rings::Named || labels.len() == shown.len());
+            let (mut labels, mut room) = place(&marks, rings, image, unit);
+            assert!(rings != Rings::Named || labels.len() == room.marked().len());
+            for i in 0..40 {
+                let at = image.map(|side| random.random_range(0.0..side));
+                let text = "M 42".to_owned();
+                let found = if i % 2 == 0 {
+                    room.beside(&text, at, 5.0, SIZE)
+                } else {
+                    room.around(&text, at, SIZE)
+                };
+                labels.extend(found.map(|at| Label {
+                    text,
+                    at,
+                    line: None,
+                }));
+            }
+            let shown = room.marked();
             placed += labels.len();
             for (i, label) in labels.iter().enumerate() {
                 let own = rectangle(label, unit);
@@ -245,7 +326,7 @@ mod tests {
             (798.0, 598.0),
             (400.0, 598.0),
         ] {
-            let (_, labels) = place(&[mark(x, y, 1.0)], Rings::All, IMAGE, 1.0);
+            let (labels, _) = place(&[mark(x, y, 1.0)], Rings::All, IMAGE, 1.0);
             assert_eq!(labels.len(), 1, "({x}, {y})");
             assert!(lies_within(&rectangle(&labels[0], 1.0), IMAGE));
         }
@@ -258,12 +339,12 @@ mod tests {
             mark(101.0, 100.0, 1.0),
             mark(102.0, 100.0, 3.0),
         ];
-        let (_, labels) = place(&crowded, Rings::All, IMAGE, 1.0);
+        let (labels, _) = place(&crowded, Rings::All, IMAGE, 1.0);
         assert_eq!(labels[0].text, "05140095 1.0");
         let alone = [mark(5.0, 5.0, 1.0)];
-        let (shown, labels) = place(&alone, Rings::Named, [20.0, 20.0], 1.0);
-        assert!(shown.is_empty() && labels.is_empty());
-        let (shown, labels) = place(&crowded, Rings::None, IMAGE, 1.0);
-        assert!(shown.is_empty() && !labels.is_empty());
+        let (labels, room) = place(&alone, Rings::Named, [20.0, 20.0], 1.0);
+        assert!(room.marked().is_empty() && labels.is_empty());
+        let (labels, room) = place(&crowded, Rings::None, IMAGE, 1.0);
+        assert!(room.marked().is_empty() && !labels.is_empty());
     }
 }

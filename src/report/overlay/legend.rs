@@ -1,6 +1,7 @@
 //! The strip below the frame: name, field, counts, scale bar and compass.
 
-use super::canvas::{Canvas, Rgb, text_width};
+use super::canvas::{Canvas, Rgb};
+use super::letters::text_width;
 use super::mark::{Mark, MarkKind};
 use super::picture::Picture;
 use crate::base::format::{counted, degrees, hours};
@@ -123,6 +124,7 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
     let count = |kind: MarkKind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
         (MarkKind::Identified, "identified"),
+        (MarkKind::Body, "of the solar system"),
         (MarkKind::Unidentified, "not identified"),
         (MarkKind::NotAStar, "not a star"),
     ];

@@ -2,9 +2,11 @@
 
 use super::canvas::{Canvas, Rgb};
 use super::names::StarLabel;
+use super::options::LabelKind;
 use super::picture::Picture;
-use crate::pipeline::{Solution, Source};
+use crate::pipeline::{BodyInFrame, Solution, Source};
 use crate::sky::catalog::Catalog;
+use crate::sky::solar_system::BodyKind;
 
 /// Smallest and largest radius of a ring, in units of strokes.
 const RADIUS: (f32, f32) = (5.0, 15.0);
@@ -13,6 +15,8 @@ const RADIUS: (f32, f32) = (5.0, 15.0);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MarkKind {
     Identified,
+    /// The Moon or a planet.
+    Body,
     Unidentified,
     NotAStar,
 }
@@ -22,16 +26,23 @@ impl MarkKind {
     pub(super) fn color(self) -> Rgb {
         match self {
             Self::Identified => Rgb([110, 205, 255]),
+            Self::Body => Rgb([255, 225, 90]),
             Self::Unidentified => Rgb([255, 170, 60]),
             Self::NotAStar => Rgb([200, 120, 190]),
         }
     }
 
-    /// Draws the form of this kind: a circle, a square or a cross.
+    /// Draws the form of this kind: a circle, a rhombus, a square or a cross.
     pub(super) fn draw(self, canvas: &mut Canvas, at: [f32; 2], radius: f32) {
         let [x, y] = at;
         match self {
             Self::Identified => canvas.ring(at, radius, 1.3, self.color()),
+            Self::Body => {
+                let side = 1.25 * radius;
+                let corners = [[x - side, y], [x, y - side], [x + side, y], [x, y + side]];
+                let rhombus = [&corners[..], &corners[..1]].concat();
+                canvas.line(&rhombus, 1.3, self.color());
+            }
             Self::Unidentified => {
                 let side = 0.8 * radius;
                 let (left, right, top, bottom) = (x - side, x + side, y - side, y + side);
@@ -68,8 +79,13 @@ impl Mark {
     }
 }
 
-/// The marks of all detections, brightest first.
-pub(super) fn marks(solution: &Solution, catalog: &Catalog, picture: &Picture) -> Vec<Mark> {
+/// The marks of the Moon and the planets, and of all detections, brightest first.
+pub(super) fn marks(
+    solution: &Solution,
+    catalog: &Catalog,
+    picture: &Picture,
+    label: LabelKind,
+) -> Vec<Mark> {
     let mut catalog_star = vec![None; solution.sources.len()];
     let identification = solution.outcome.identification();
     for star_match in identification.iter().flat_map(|found| &found.matches) {
@@ -78,11 +94,16 @@ pub(super) fn marks(solution: &Solution, catalog: &Catalog, picture: &Picture) -
         }
     }
     let rings = Rings::of(&solution.sources, picture);
-    let sources = solution.sources.iter().zip(catalog_star);
-    sources
-        .map(|(source, star)| {
+    let is_body = |index: usize| {
+        let mut bodies = solution.bodies.iter().filter_map(|body| body.source);
+        bodies.any(|source| source.get() == index)
+    };
+    let sources = solution.sources.iter().zip(catalog_star).enumerate();
+    let stars = sources
+        .filter(|(index, _)| !is_body(*index))
+        .map(|(_, (source, star))| {
             let [x, y] = picture.position_of(&source.position);
-            let label = star.map(|index| StarLabel::of(catalog, index));
+            let label = star.map(|index| StarLabel::of(catalog, index, label));
             Mark {
                 x,
                 y,
@@ -90,8 +111,29 @@ pub(super) fn marks(solution: &Solution, catalog: &Catalog, picture: &Picture) -
                 kind: kind(source, label.is_some()),
                 label,
             }
-        })
-        .collect()
+        });
+    bodies(solution, picture).chain(stars).collect()
+}
+
+/// The marks of the planets that are seen, and of the Moon, which may be too bright to be a detection.
+fn bodies(solution: &Solution, picture: &Picture) -> impl Iterator<Item = Mark> {
+    let identified = solution.outcome.identification();
+    let focal_px = identified.map_or(0.0, |found| found.camera.focal_length_px());
+    let shown = |seen: &&BodyInFrame| seen.source.is_some() || seen.body.kind == BodyKind::Moon;
+    solution.bodies.iter().filter(shown).map(move |seen| {
+        let source = seen
+            .source
+            .and_then(|index| solution.sources.get(index.get()));
+        let [x, y] = picture.position_of(source.map_or(&seen.position, |source| &source.position));
+        let disc = (seen.body.radius_rad * focal_px) as f32 * picture.scale();
+        Mark {
+            x,
+            y,
+            radius: disc.max(RADIUS.0 * 1.6 * picture.stroke_unit()),
+            kind: MarkKind::Body,
+            label: Some(StarLabel::of_body(&seen.body)),
+        }
+    })
 }
 
 fn kind(source: &Source, identified: bool) -> MarkKind {

@@ -1,14 +1,16 @@
 //! What does the frame show? A picture of it with its stars ringed and named.
 //!
-//! ([`Shown`], [`Solution`], [`Catalog`]) → [`RgbImage`]. Nothing is read or written, and equal
+//! ([`Shown`], [`Solution`], [`Catalog`]) → a picture ([`OverlayFormat`]). Nothing is read or written, and equal
 //! input gives equal pictures.
 //!
 //! 1. The frame becomes a picture, in its own colors where these are known ([`Stretch`]). Small frames are enlarged and large ones reduced, by
 //!    whole factors.
 //! 2. Names and V magnitudes of the brightest stars are placed where there is room, brightest first. They
 //!    cover neither each other nor what is marked.
-//! 3. Detections are marked ([`Rings`]): a circle is identified, a square is not, a cross is not a star.
-//! 4. Where site and time are known: zenith, horizon and cardinal points.
+//! 3. Detections are marked ([`Rings`]): a circle is identified, a square is not, a cross is not a star; a
+//!    rhombus is the Moon or a planet.
+//! 4. Where site and time are known: zenith, horizon and cardinal points. Where they are wanted
+//!    ([`SkyLayers`]): grids, constellations, clusters, nebulae and galaxies.
 //! 5. A strip below the frame shows file, centre and field, the meaning of the rings, a scale bar,
 //!    and north and east at the frame's centre.
 //!
@@ -16,19 +18,24 @@
 //! pixel (0, 0) lies half a pixel from the picture's corner.
 
 mod canvas;
-mod horizon;
+mod encode;
 mod labels;
 mod legend;
+mod letters;
 mod mark;
 mod names;
 mod options;
 mod picture;
+mod raster;
 mod shown;
+mod sky;
+mod svg;
 
 #[doc(hidden)]
-pub use canvas::FONT;
+pub use letters::FONT;
+#[doc(hidden)]
+pub use svg::is_overlay as is_svg;
 
-use crate::frame::OVERLAY_TEXT;
 use crate::pipeline::Solution;
 use crate::sky::catalog::Catalog;
 use canvas::Canvas;
@@ -37,21 +44,26 @@ use mark::MarkKind;
 use picture::Picture;
 use std::io;
 
-pub use options::{OverlayOptions, Rings, Stretch};
+pub use options::{LabelKind, OverlayFormat, OverlayOptions, Rings, SkyLayers, Stretch};
 pub use shown::Shown;
 
-/// Draws a frame with its detections, as PNG. The file is marked as an overlay
+/// Draws a frame with its detections, as a file of the kind that `options` say. It is marked as an overlay
 /// ([`is_overlay`](crate::frame::is_overlay)).
 ///
 /// # Errors
 /// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
-pub fn png(
+pub fn encoded(
     shown: &Shown<'_>,
     solution: &Solution,
     catalog: &Catalog,
     options: &OverlayOptions,
 ) -> io::Result<Vec<u8>> {
-    to_png(&draw(shown, solution, catalog, options)).map_err(io::Error::other)
+    let (canvas, picture) = drawing(shown, solution, catalog, options);
+    match options.format {
+        OverlayFormat::Png => encode::png(&raster::image(&canvas, &picture)),
+        OverlayFormat::Jpeg => encode::marked_jpeg(&raster::image(&canvas, &picture)),
+        OverlayFormat::Svg => svg::document(&canvas, picture).map(String::into_bytes),
+    }
 }
 
 /// Draws a frame with its detections.
@@ -62,17 +74,28 @@ pub fn draw(
     catalog: &Catalog,
     options: &OverlayOptions,
 ) -> RgbImage {
-    let picture = Picture::of(shown, solution.background.as_ref(), options.stretch);
-    let marks = mark::marks(solution, catalog, &picture);
+    let (canvas, picture) = drawing(shown, solution, catalog, options);
+    raster::image(&canvas, &picture)
+}
+
+/// The frame as a picture, and what is drawn over it.
+fn drawing(
+    shown: &Shown<'_>,
+    solution: &Solution,
+    catalog: &Catalog,
+    options: &OverlayOptions,
+) -> (Canvas, Picture) {
+    let picture = Picture::of(shown, solution.background.as_ref(), options);
+    let marks = mark::marks(solution, catalog, &picture, options.label);
     let unit = picture.stroke_unit();
-    let mut canvas = Canvas::new(&picture, legend::size(&picture, unit), unit);
+    let mut canvas = Canvas::new(legend::size(&picture, unit), unit);
     let image = [picture.width as f32, picture.height as f32];
-    let (marked, labels) = labels::place(&marks, options.rings, image, unit);
-    for mark in marked.iter().rev() {
-        mark.draw(&mut canvas);
-    }
+    let (labels, mut room) = labels::place(&marks, options.rings, image, unit);
     if let Some(found) = solution.outcome.identification() {
-        horizon::draw(&mut canvas, &picture, found);
+        sky::draw(&mut canvas, &picture, found, options.sky, &mut room);
+    }
+    for mark in room.marked().iter().rev() {
+        mark.draw(&mut canvas);
     }
     let letters = MarkKind::Identified.color().lighter();
     for label in labels {
@@ -82,32 +105,21 @@ pub fn draw(
         canvas.text(&label.text, label.at, labels::SIZE, letters);
     }
     legend::draw(&mut canvas, &picture, shown.title, solution, &marks);
-    canvas.into_image()
+    (canvas, picture)
 }
 
-/// A frame without marks, at the size of its overlay.
+/// A frame without marks, at the size of its overlay, as JPEG.
+///
+/// # Errors
+/// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
 #[cfg(feature = "page")]
 pub(super) fn photograph(
     shown: &Shown<'_>,
     solution: &Solution,
     options: &OverlayOptions,
-) -> RgbImage {
-    Picture::of(shown, solution.background.as_ref(), options.stretch).into_image()
-}
-
-/// Encodes the picture, fast rather than small.
-fn to_png(picture: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let (width, height) = picture.dimensions();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    // Filters do not help with noise; equal grey levels compress without them.
-    encoder.set_filter(png::Filter::NoFilter);
-    encoder.set_deflate_compression(png::DeflateCompression::Level(1));
-    let (keyword, text) = OVERLAY_TEXT;
-    encoder.add_text_chunk(keyword.to_owned(), text.to_owned())?;
-    encoder.write_header()?.write_image_data(picture)?;
-    Ok(bytes)
+) -> io::Result<Vec<u8>> {
+    let picture = Picture::of(shown, solution.background.as_ref(), options);
+    encode::jpeg(&picture.into_image())
 }
 
 #[cfg(test)]

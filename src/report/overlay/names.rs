@@ -1,6 +1,8 @@
 //! The label of a star: its name and magnitude.
 
+use super::options::LabelKind;
 use crate::sky::catalog::{Catalog, StarIndex};
+use crate::sky::solar_system::Body;
 
 /// SKY2000's abbreviations of the Greek letters.
 const GREEK: [(&str, char); 24] = [
@@ -35,41 +37,49 @@ const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', 
 /// What is written beside a star.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct StarLabel {
-    /// The star's proper name, else its letter, else its number, and its V magnitude: `Sirius −1.4`, `α CMi
-    /// 0.4`.
+    /// The star's name or number, and its V magnitude: `Sirius −1.4`, `α CMi 0.4`, `HD 12345 7.2`.
     pub(super) text: String,
     /// Its V magnitude.
     pub(super) v_mag: f32,
-    /// Whether it has more than a number.
+    /// Whether it has a name or number of the kind that is wanted.
     pub(super) has_name: bool,
 }
 
 impl StarLabel {
     /// The label of a star.
-    pub(super) fn of(catalog: &Catalog, star: StarIndex) -> Self {
-        let name = match (catalog.proper_name(star), catalog.name_of(star)) {
-            (Some(name), _) => Some(name.to_owned()),
-            (None, Some(name)) => Some(short(name)),
-            (None, None) => None,
+    pub(super) fn of(catalog: &Catalog, star: StarIndex, kind: LabelKind) -> Self {
+        let name = || {
+            let proper = catalog.proper_name(star).map(str::to_owned);
+            proper.or_else(|| catalog.name_of(star).map(short))
         };
-        let has_name = name.is_some();
-        let name = name.unwrap_or_else(|| number(&catalog.designation(star)).to_owned());
-        let v_mag = catalog.star(star).v_mag;
+        let numbers = catalog.numbers_of(star);
+        let hd = || numbers.hd.map(|number| format!("HD {number}"));
+        let hip = || numbers.hip.map(|number| format!("HIP {number}"));
+        let wanted = match kind {
+            LabelKind::Name => name(),
+            LabelKind::Hd => hd(),
+            LabelKind::Hip => hip(),
+        };
+        let has_name = wanted.is_some();
+        let called = wanted.or_else(name).or_else(hd).or_else(hip);
+        let called = called.unwrap_or_else(|| catalog.designation(star));
+        Self::new(&called, catalog.star(star).v_mag, has_name)
+    }
+
+    /// The label of the Moon or a planet.
+    pub(super) fn of_body(body: &Body) -> Self {
+        Self::new(body.kind.name(), body.v_mag as f32, true)
+    }
+
+    fn new(called: &str, v_mag: f32, has_name: bool) -> Self {
         let rounded = format!("{v_mag:.1}");
         let rounded = if rounded == "-0.0" { "0.0" } else { &rounded };
         Self {
-            text: format!("{name} {}", rounded.replace('-', "−")),
+            text: format!("{called} {}", rounded.replace('-', "−")),
             v_mag,
             has_name,
         }
     }
-}
-
-/// A designation without its catalogue, which would be the same for all stars of the picture.
-fn number(designation: &str) -> &str {
-    designation
-        .split_once(' ')
-        .map_or(designation, |(_, number)| number)
 }
 
 /// The Bayer letter in Greek, or the Flamsteed number, with the constellation: `9 alp CMa` is `α
@@ -111,24 +121,34 @@ mod tests {
     }
 
     #[test]
-    fn the_brightest_star_is_called_by_its_name_and_the_faintest_by_its_number() {
+    fn a_star_is_called_by_what_is_wanted_and_else_by_the_next() {
         let catalog = Catalog::built_in();
-        assert_eq!(
-            StarLabel::of(catalog, StarIndex::new(0)).text,
-            "Sirius −1.4"
-        );
+        let called = |star, kind| StarLabel::of(catalog, star, kind);
+        let sirius = StarIndex::new(0);
+        assert_eq!(called(sirius, LabelKind::Name).text, "Sirius −1.4");
+        assert_eq!(called(sirius, LabelKind::Hd).text, "HD 48915 −1.4");
+        assert_eq!(called(sirius, LabelKind::Hip).text, "HIP 32349 −1.4");
+        let stars = || (0..catalog.stars().len()).map(StarIndex::new);
         let is_lettered = |star: &StarIndex| {
             let letter = catalog
                 .name_of(*star)
                 .is_some_and(|name| name.contains("gam "));
             letter && catalog.proper_name(*star).is_none()
         };
-        let lettered = (0..500).map(StarIndex::new).find(is_lettered).unwrap();
-        assert!(StarLabel::of(catalog, lettered).text.starts_with('γ'));
-        let last = StarIndex::new(catalog.stars().len() - 1);
-        let designation = catalog.designation(last);
-        let (_, number) = designation.split_once(' ').unwrap();
-        assert!(StarLabel::of(catalog, last).text.starts_with(number));
+        let lettered = stars().find(is_lettered).unwrap();
+        assert!(called(lettered, LabelKind::Name).text.starts_with('γ'));
+        let is_nameless = |star: &StarIndex| {
+            let numbers = catalog.numbers_of(*star);
+            catalog.name_of(*star).is_none() && numbers.hd.is_some() && numbers.hip.is_none()
+        };
+        let nameless = called(stars().find(is_nameless).unwrap(), LabelKind::Hip);
+        assert!(nameless.text.starts_with("HD ") && !nameless.has_name);
+        let without_numbers = |star: &StarIndex| {
+            let numbers = catalog.numbers_of(*star);
+            catalog.full_name(*star).is_none() && numbers.hd.is_none() && numbers.hip.is_none()
+        };
+        let last = called(stars().find(without_numbers).unwrap(), LabelKind::Name);
+        assert!(last.text.starts_with("SKYMAP "));
     }
 
     #[test]

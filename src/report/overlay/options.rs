@@ -8,6 +8,15 @@ pub struct OverlayOptions {
     pub stretch: Stretch,
     /// Which detections are marked.
     pub rings: Rings,
+    /// What stars are called.
+    pub label: LabelKind,
+    /// What else of the sky is drawn, where the frame is identified.
+    pub sky: SkyLayers,
+    /// Width of the frame in the picture, in pixels; by default the frame's own or a whole fraction or
+    /// multiple of it.
+    pub width_px: Option<u32>,
+    /// The kind of file.
+    pub format: OverlayFormat,
 }
 
 impl OverlayOptions {
@@ -41,4 +50,57 @@ pub enum Rings {
     All,
     /// None.
     None,
+}
+
+/// What stars are called. A star without such a name or number has the next of: name, HD number,
+/// Hipparcos number, identifier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum LabelKind {
+    /// By proper name, else by Bayer letter or Flamsteed number: `Rigel`, `α CMi`, `24 Tau`.
+    #[default]
+    Name,
+    /// By Henry Draper number: `HD 34085`.
+    Hd,
+    /// By Hipparcos number: `HIP 24436`.
+    Hip,
+}
+
+/// What of the sky is drawn beside its stars. The Moon and the planets, and where site and time are known
+/// the horizon, always are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct SkyLayers {
+    /// The figures and names of the constellations.
+    pub constellations: bool,
+    /// The brightest clusters, nebulae and galaxies.
+    pub deep_sky: bool,
+    /// Right ascension and declination.
+    pub equatorial_grid: bool,
+    /// Azimuth and altitude, where site and time are known.
+    pub horizontal_grid: bool,
+}
+
+/// The kind of file of an overlay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum OverlayFormat {
+    /// PNG.
+    #[default]
+    Png,
+    /// JPEG.
+    Jpeg,
+    /// SVG, with the frame as a JPEG within it: marks and names stay sharp, and names can be searched.
+    Svg,
+}
+
+impl OverlayFormat {
+    /// The extension of its files.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpeg => "jpg",
+            Self::Svg => "svg",
+        }
+    }
 }

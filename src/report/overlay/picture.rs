@@ -1,14 +1,14 @@
 //! The frame as a picture.
 
-use super::options::Stretch;
+use super::options::{OverlayOptions, Stretch};
 use super::shown::Shown;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::{Colors, Frame, luminance};
 use crate::pipeline::Background;
-#[cfg(feature = "page")]
 use image::RgbImage;
+use image::imageops::{FilterType, resize};
 
 /// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
 const SKY_LEVELS: [f32; 2] = [0.2, 0.35];
@@ -21,26 +21,42 @@ pub(super) struct Picture {
     pub(super) height: usize,
     /// Red, green and blue; row-major, `height * width`.
     pub(super) pixels: Vec<[u8; 3]>,
-    enlarged: usize,
-    reduced: usize,
+    /// Pixels of the picture per pixel of the frame, along one axis.
+    scale: f32,
+}
+
+/// By which whole factors a frame is enlarged and reduced: the smallest that give a picture of suitable
+/// size, or the ones nearest to a width that is not exceeded.
+fn factors(frame: &Frame<'_>, width_px: Option<u32>) -> (usize, usize) {
+    /// Frames with a shorter longest side are enlarged to at least this.
+    const ENLARGE_BELOW_PX: usize = 800;
+    /// Frames with a longer longest side are reduced to at most this.
+    const REDUCE_ABOVE_PX: usize = 2500;
+    if let Some(width_px) = width_px {
+        let width_px = (width_px as usize).max(1);
+        return (
+            (width_px / frame.width).max(1),
+            (frame.width / width_px).max(1),
+        );
+    }
+    let longer = frame.width.max(frame.height);
+    let enlarged = if longer < ENLARGE_BELOW_PX {
+        ENLARGE_BELOW_PX.div_ceil(longer)
+    } else {
+        1
+    };
+    (enlarged, longer.div_ceil(REDUCE_ABOVE_PX).max(1))
 }
 
 impl Picture {
-    /// `frame`, stretched, enlarged or reduced by the smallest whole factor that gives a picture of
-    /// suitable size.
-    pub(super) fn of(shown: &Shown<'_>, background: Option<&Background>, stretch: Stretch) -> Self {
-        /// Frames with a shorter longest side are enlarged to at least this.
-        const ENLARGE_BELOW_PX: usize = 800;
-        /// Frames with a longer longest side are reduced to at most this.
-        const REDUCE_ABOVE_PX: usize = 2500;
+    /// `frame`, stretched, and enlarged or reduced to a suitable size or to that which is wanted.
+    pub(super) fn of(
+        shown: &Shown<'_>,
+        background: Option<&Background>,
+        options: &OverlayOptions,
+    ) -> Self {
         let frame = shown.frame;
-        let longer = frame.width.max(frame.height);
-        let enlarged = if longer < ENLARGE_BELOW_PX {
-            ENLARGE_BELOW_PX.div_ceil(longer)
-        } else {
-            1
-        };
-        let reduced = longer.div_ceil(REDUCE_ABOVE_PX).max(1);
+        let (enlarged, reduced) = factors(frame, options.width_px);
         let (width, height) = (
             frame.width.div_ceil(reduced),
             frame.height.div_ceil(reduced),
@@ -51,7 +67,7 @@ impl Picture {
             side: reduced,
             size,
         };
-        let small = match stretch {
+        let small = match options.stretch {
             Stretch::None => photograph(&squares, shown.colors, None),
             Stretch::Soft => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
             Stretch::Hard => {
@@ -65,17 +81,37 @@ impl Picture {
         } else {
             small
         };
-        Self {
+        let picture = Self {
             width: width * enlarged,
             height: height * enlarged,
             pixels,
-            enlarged,
-            reduced,
+            scale: enlarged as f32 / reduced as f32,
+        };
+        match options.width_px {
+            Some(wanted) => picture.with_width(wanted.max(1)),
+            None => picture,
+        }
+    }
+
+    /// The picture at exactly this width.
+    fn with_width(self, width: u32) -> Self {
+        if self.width == width as usize {
+            return self;
+        }
+        let factor = width as f32 / self.width as f32;
+        let height = ((self.height as f32 * factor).round() as u32).max(1);
+        let scale = self.scale * factor;
+        let resized = resize(&self.into_image(), width, height, FilterType::Triangle);
+        let pixels = resized.pixels().map(|pixel| pixel.0).collect();
+        Self {
+            width: width as usize,
+            height: height as usize,
+            pixels,
+            scale,
         }
     }
 
     /// The picture without marks.
-    #[cfg(feature = "page")]
     pub(super) fn into_image(self) -> RgbImage {
         let size = [self.width as u32, self.height as u32];
         RgbImage::from_raw(size[0], size[1], self.pixels.into_flattened())
@@ -84,7 +120,7 @@ impl Picture {
 
     /// Pixels of the picture per pixel of the frame, along one axis.
     pub(super) fn scale(&self) -> f32 {
-        self.enlarged as f32 / self.reduced as f32
+        self.scale
     }
 
     /// Size of letters and strokes, relative to those on a picture of ordinary size.
@@ -331,6 +367,39 @@ mod tests {
         Frame::new(width, height, (0..width * height).map(noise).collect()).unwrap()
     }
 
+    fn with(stretch: Stretch) -> OverlayOptions {
+        OverlayOptions {
+            stretch,
+            ..OverlayOptions::default()
+        }
+    }
+
+    #[test]
+    fn a_picture_has_the_width_that_is_wanted() {
+        for (width, height, wanted) in [
+            (640, 480, 1000),
+            (640, 480, 100),
+            (640, 480, 640),
+            (50, 7, 333),
+        ] {
+            let options = OverlayOptions {
+                width_px: Some(wanted),
+                ..OverlayOptions::default()
+            };
+            let frame = frame(width, height);
+            let picture = Picture::of(&Shown::new("", &frame), None, &options);
+            assert_eq!(picture.width, wanted as usize);
+            assert_eq!(picture.pixels.len(), picture.width * picture.height);
+            let far = PixelPoint::new(width as f64 - 0.5, height as f64 - 0.5);
+            let [x, y] = picture.position_of(&far);
+            assert!((x - wanted as f32).abs() < 0.01 * wanted as f32, "{x}");
+            assert!(
+                (y - picture.height as f32).abs() < 1.0 + 0.01 * wanted as f32,
+                "{y}"
+            );
+        }
+    }
+
     #[test]
     fn small_frames_are_enlarged_and_large_ones_reduced_by_whole_factors() {
         for (size, expected, scale) in [
@@ -341,7 +410,11 @@ mod tests {
             ((2600, 100), (1300, 50), 0.5),
             ((5001, 3), (1667, 1), 1.0 / 3.0),
         ] {
-            let picture = Picture::of(&Shown::new("", &frame(size.0, size.1)), None, Stretch::Soft);
+            let picture = Picture::of(
+                &Shown::new("", &frame(size.0, size.1)),
+                None,
+                &with(Stretch::Soft),
+            );
             assert_eq!((picture.width, picture.height), expected, "{size:?}");
             assert_eq!(picture.pixels.len(), picture.width * picture.height);
             assert_eq!(picture.scale(), scale, "{size:?}");
@@ -350,7 +423,11 @@ mod tests {
 
     #[test]
     fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
-        let picture = Picture::of(&Shown::new("", &frame(400, 400)), None, Stretch::None);
+        let picture = Picture::of(
+            &Shown::new("", &frame(400, 400)),
+            None,
+            &with(Stretch::None),
+        );
         assert_eq!(
             picture.position_of(&PixelPoint::new(0.0, 399.0)),
             [1.0, 799.0]
@@ -377,7 +454,7 @@ mod tests {
             noise_adu: 2.9,
             sky_share: 1.0,
         };
-        let picture = Picture::of(&Shown::new("", &frame), Some(&sky), Stretch::Hard);
+        let picture = Picture::of(&Shown::new("", &frame), Some(&sky), &with(Stretch::Hard));
         assert_eq!(picture.pixels[315 * width + 415], [255; 3]);
         assert_eq!(picture.pixels[5], [0; 3]);
         let mean = |from: usize| {
@@ -438,10 +515,10 @@ mod tests {
             colors: Some(&colors),
             ..Shown::new("", &frame)
         };
-        let picture = Picture::of(&shown, None, Stretch::Soft);
+        let picture = Picture::of(&shown, None, &with(Stretch::Soft));
         let ordered = |[r, g, b]: &&[u8; 3]| r >= g && g >= b && r > b;
         assert!(picture.pixels.iter().filter(ordered).count() > width * height * 9 / 10);
-        let grey = Picture::of(&shown, None, Stretch::Hard);
+        let grey = Picture::of(&shown, None, &with(Stretch::Hard));
         assert!(grey.pixels.iter().all(|[r, g, b]| r == g && g == b));
     }
 }

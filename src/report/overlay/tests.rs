@@ -195,8 +195,79 @@ fn north_and_east_are_where_the_camera_sees_them() {
 
 #[test]
 fn a_picture_is_the_same_after_it_was_a_file() {
-    let solution = solution(WIDTH, HEIGHT, identified(0.0, false));
-    let picture = drawn("a.tif", &frame(WIDTH, HEIGHT), &solution);
-    let png = to_png(&picture).unwrap();
-    assert_eq!(image::load_from_memory(&png).unwrap().to_rgb8(), picture);
+    let (frame, solution) = (
+        frame(WIDTH, HEIGHT),
+        solution(WIDTH, HEIGHT, identified(0.0, false)),
+    );
+    let shown = Shown::new("a.tif", &frame);
+    let file = |format| {
+        let options = OverlayOptions {
+            format,
+            ..OverlayOptions::default()
+        };
+        encoded(&shown, &solution, Catalog::built_in(), &options).unwrap()
+    };
+    let picture = draw(
+        &shown,
+        &solution,
+        Catalog::built_in(),
+        &OverlayOptions::default(),
+    );
+    let png = image::load_from_memory(&file(OverlayFormat::Png)).unwrap();
+    assert_eq!(png.to_rgb8(), picture);
+    let jpeg = image::load_from_memory(&file(OverlayFormat::Jpeg)).unwrap();
+    assert_eq!(jpeg.to_rgb8().dimensions(), picture.dimensions());
+    let svg = file(OverlayFormat::Svg);
+    assert!(is_svg(&svg));
+    let svg = String::from_utf8(svg).unwrap();
+    assert!(svg.contains(">Sirius −1.4</text>") && svg.contains("data:image/jpeg"));
+}
+
+/// What is written on the picture of an identified frame.
+fn texts(sky: SkyLayers, solution: &Solution) -> Vec<String> {
+    let frame = frame(WIDTH, HEIGHT);
+    let options = OverlayOptions {
+        sky,
+        ..OverlayOptions::default()
+    };
+    let (canvas, _) = drawing(
+        &Shown::new("", &frame),
+        solution,
+        Catalog::built_in(),
+        &options,
+    );
+    let texts = canvas.shapes.into_iter().filter_map(|shape| match shape {
+        canvas::Shape::Text { text, .. } => Some(text),
+        _ => None,
+    });
+    texts.collect()
+}
+
+#[test]
+fn the_sky_is_drawn_where_it_is_wanted() {
+    let auriga = solution(WIDTH, HEIGHT, identified(0.0, false));
+    let none = SkyLayers::default();
+    let wanted = SkyLayers {
+        constellations: true,
+        deep_sky: true,
+        equatorial_grid: true,
+        horizontal_grid: true,
+    };
+    let written = |text: &str, sky| texts(sky, &auriga).iter().any(|other| other == text);
+    for text in ["M 36", "M 38", "+30°", "5h20m"] {
+        assert!(
+            written(text, wanted),
+            "{text}: {:?}",
+            texts(wanted, &auriga)
+        );
+        assert!(!written(text, none), "{text}");
+    }
+    // There is no site.
+    assert!(
+        !texts(wanted, &auriga)
+            .iter()
+            .any(|text| text.starts_with("alt"))
+    );
+    let nothing = texts(wanted, &solution(WIDTH, HEIGHT, not_identified()));
+    assert!(!nothing.contains(&"M 36".to_owned()));
 }

@@ -94,9 +94,7 @@ fn offsets(solution: &Solution) -> Vec<Option<[f64; 2]>> {
     };
     for star_match in &found.matches {
         let source = star_match.source.get();
-        let predicted = found
-            .camera
-            .pixel_of(&found.icrs_to_camera.apply(&star_match.light));
+        let predicted = found.pixel_of(&star_match.light);
         if let (Some(offset), Some(predicted)) = (offsets.get_mut(source), predicted) {
             let observed = solution.sources[source].position;
             *offset = Some([observed.x - predicted.x, observed.y - predicted.y]);

@@ -18,14 +18,10 @@ use crate::pipeline::Solution;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use data::PageData;
-use image::codecs::jpeg::JpegEncoder;
 use memchr::memmem;
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
 use std::io;
-
-/// Quality of the picture, as JPEG counts it.
-const JPEG_QUALITY: u8 = 85;
 
 /// The page of a frame; without `shown`, as for a list of centroids, without its picture.
 ///
@@ -38,7 +34,7 @@ pub fn html(
     options: &OverlayOptions,
 ) -> io::Result<String> {
     let picture = shown
-        .map(|shown| jpeg(shown, solution, options))
+        .map(|shown| photograph(shown, solution, options))
         .transpose()?;
     let picture = picture.map(|jpeg| format!("data:image/jpeg;base64,{}", BASE64.encode(jpeg)));
     let mut environment = Environment::new();
@@ -64,17 +60,6 @@ pub fn html(
 pub fn is_page(head: &[u8]) -> bool {
     const GENERATOR: &[u8] = b"<meta name=\"generator\" content=\"starpipe\">";
     memmem::find(head, GENERATOR).is_some()
-}
-
-/// The frame without marks, as JPEG.
-fn jpeg(shown: &Shown<'_>, solution: &Solution, options: &OverlayOptions) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let picture = photograph(shown, solution, options);
-    let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
-    picture
-        .write_with_encoder(encoder)
-        .map_err(io::Error::other)?;
-    Ok(bytes)
 }
 
 /// JSON that may stand in a script: a name cannot end it.

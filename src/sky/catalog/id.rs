@@ -148,6 +148,11 @@ impl HipparcosId {
         valid.then_some(Self((number << 8) | u32::from(component.unwrap_or(0))))
     }
 
+    /// The number, without a component.
+    pub(super) const fn number(self) -> u32 {
+        self.0 >> 8
+    }
+
     /// Parses a number, optionally followed by a letter.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let bytes = text.as_bytes();
@@ -162,7 +167,7 @@ impl HipparcosId {
 
 impl fmt::Display for HipparcosId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "HIP {}", self.0 >> 8)?;
+        write!(f, "HIP {}", self.number())?;
         match self.0 as u8 {
             0 => Ok(()),
             letter => write!(f, "{}", char::from(letter)),

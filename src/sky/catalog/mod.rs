@@ -48,6 +48,7 @@ mod contents;
 mod error;
 mod id;
 mod import;
+mod numbers;
 mod position;
 mod proper_names;
 mod read;
@@ -66,6 +67,7 @@ pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
 #[doc(hidden)]
 pub use import::{ImportSummary, Reading, SourceFile};
+pub use numbers::StarNumbers;
 #[doc(hidden)]
 pub use read::read_until;
 #[doc(hidden)]

@@ -2,7 +2,9 @@
 
 use super::contents::Contents;
 use super::star::J2000_YEAR;
-use super::{CatalogError, CompactError, Star, StarId, StarIndex, compact, proper_names};
+use super::{
+    CatalogError, CompactError, Star, StarId, StarIndex, StarNumbers, compact, proper_names,
+};
 use crate::base::files;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -19,6 +21,7 @@ use std::sync::OnceLock;
 /// assert_eq!(catalog.designation(sirius), "SKYMAP 06450045");
 /// assert_eq!(catalog.name_of(sirius), Some("9 alp CMa"));
 /// assert_eq!(catalog.proper_name(sirius), Some("Sirius"));
+/// assert_eq!(catalog.numbers_of(sirius).hd, Some(48_915));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Catalog {
@@ -149,6 +152,14 @@ impl Catalog {
             (StarId::Named(_), Some(name)) => name.to_owned(),
             _ => id.to_string(),
         }
+    }
+
+    /// The numbers of a star in other catalogues. Stars are known by their Skymap or Hipparcos number.
+    ///
+    /// # Panics
+    /// If there is no such star.
+    pub fn numbers_of(&self, star: StarIndex) -> StarNumbers {
+        StarNumbers::of(self.star(star).id)
     }
 
     /// The index of the star `id`; a linear search.

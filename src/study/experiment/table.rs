@@ -175,9 +175,7 @@ fn stars_among(published: &Published, found: &Identification, catalog: &Catalog)
     let (columns, rows) = (bounds(|p| p.x), bounds(|p| p.y));
     let is_among = |star: &StarIndex| {
         let apparent = found.places.of(catalog.star(*star));
-        let pixel = found
-            .camera
-            .pixel_of(&found.icrs_to_camera.apply(&apparent));
+        let pixel = found.pixel_of(&apparent);
         pixel.is_some_and(|p| columns.contains(&p.x) && rows.contains(&p.y))
     };
     let as_bright = catalog.brighter_than(published.faintest_vmag + ROUNDING_MAG);

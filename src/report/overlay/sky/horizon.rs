@@ -1,9 +1,8 @@
 //! Zenith, horizon and cardinal points, where site and time are known.
 
-use super::canvas::{Canvas, Rgb, text_width};
-use super::picture::Picture;
+use super::view::View;
 use crate::base::units::RAD_PER_DEG;
-use crate::identify::Identification;
+use crate::report::overlay::canvas::{Canvas, Rgb};
 
 /// Color of the lines.
 const COLOR: Rgb = Rgb([110, 170, 255]);
@@ -19,32 +18,20 @@ const STEP_DEG: u32 = 1;
 const LOWEST_DEG: std::ops::RangeInclusive<u32> = 1..=20;
 
 /// Draws what of them is in the frame.
-pub(super) fn draw(canvas: &mut Canvas, picture: &Picture, found: &Identification) {
+pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>) {
     let place = |azimuth_deg: f64, altitude_deg: f64| {
         let [azimuth_rad, altitude_rad] = [azimuth_deg, altitude_deg].map(|deg| deg * RAD_PER_DEG);
-        let apparent = found.places.in_horizon(azimuth_rad, altitude_rad)?;
-        let pixel = found
-            .camera
-            .pixel_of(&found.icrs_to_camera.apply(&apparent))?;
-        found
-            .camera
-            .contains(&pixel)
-            .then(|| picture.position_of(&pixel))
+        view.apparent(&view.found.places.in_horizon(azimuth_rad, altitude_rad)?)
     };
-    let horizon: Vec<Option<[f32; 2]>> = (0..=360)
+    let horizon: Vec<_> = (0..=360)
         .step_by(STEP_DEG as usize)
         .map(|azimuth_deg| place(f64::from(azimuth_deg), 0.0))
         .collect();
-    for seen in horizon.split(Option::is_none) {
-        let line: Vec<[f32; 2]> = seen.iter().copied().flatten().collect();
-        if line.len() > 1 {
-            canvas.line(&line, 1.2, COLOR);
-        }
-    }
+    View::draw_line(canvas, &horizon, 1.2, COLOR);
     for (letter, azimuth_deg) in CARDINALS {
         let mut seen = LOWEST_DEG.filter_map(|altitude| place(azimuth_deg, f64::from(altitude)));
         if let Some([x, y]) = seen.next() {
-            let width = text_width(letter, LETTERS * canvas.unit);
+            let width = canvas.text_width(letter, LETTERS);
             let at = [x - width / 2.0, y + 0.36 * LETTERS * canvas.unit];
             canvas.text(letter, at, LETTERS, COLOR);
         }

@@ -1,0 +1,124 @@
+//! How overlays are drawn.
+
+use clap::{Args, ValueEnum};
+use starpipe::report::overlay::{LabelKind, OverlayFormat, OverlayOptions, Rings, Stretch};
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub(super) struct OverlayArgs {
+    /// How the picture shows the frame
+    #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
+    stretch: StretchOption,
+    /// Which detections are marked
+    #[arg(long, value_enum, default_value_t = RingsOption::Named, requires = "out")]
+    rings: RingsOption,
+    /// What stars are called
+    #[arg(long, value_enum, default_value_t = LabelOption::Name, requires = "out")]
+    label: LabelOption,
+    /// What else of the sky is drawn, separated by commas
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHAT",
+        value_delimiter = ',',
+        requires = "out"
+    )]
+    draw: Vec<SkyOption>,
+    /// Width of the picture, in pixels [default: that of the frame, or a whole fraction or multiple of it]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=20_000), requires = "out")]
+    overlay_width: Option<u32>,
+    /// Kind of the picture's file: FRAME.png, FRAME.jpg or FRAME.svg
+    #[arg(long, value_enum, default_value_t = FormatOption::Png, requires = "out")]
+    overlay_format: FormatOption,
+}
+
+/// How an overlay shows the frame.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StretchOption {
+    /// In proportion to its levels
+    None,
+    /// With a dark sky brightened
+    Soft,
+    /// Without its background, so that faint stars show
+    Hard,
+}
+
+/// Which detections an overlay marks.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum RingsOption {
+    /// The brightest identified stars, with their names; all where the frame is not identified
+    Named,
+    /// All
+    All,
+    /// None
+    None,
+}
+
+/// What stars are called.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LabelOption {
+    /// By name: Rigel, α CMi, 24 Tau
+    Name,
+    /// By Henry Draper number: HD 34085
+    Hd,
+    /// By Hipparcos number: HIP 24436
+    Hip,
+}
+
+/// What else of the sky is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SkyOption {
+    /// Figures and names of the constellations
+    Constellations,
+    /// The brightest clusters, nebulae and galaxies
+    DeepSky,
+    /// Right ascension and declination
+    Grid,
+    /// Azimuth and altitude, where site and time are known
+    AltazGrid,
+}
+
+/// Kinds of files.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FormatOption {
+    /// All levels as drawn
+    Png,
+    /// Small
+    Jpg,
+    /// Marks and names as lines and text, over the frame as JPEG
+    Svg,
+}
+
+impl OverlayArgs {
+    /// How to draw overlays.
+    pub(super) fn options(&self) -> OverlayOptions {
+        let mut options = OverlayOptions::default();
+        options.stretch = match self.stretch {
+            StretchOption::None => Stretch::None,
+            StretchOption::Soft => Stretch::Soft,
+            StretchOption::Hard => Stretch::Hard,
+        };
+        options.rings = match self.rings {
+            RingsOption::Named => Rings::Named,
+            RingsOption::All => Rings::All,
+            RingsOption::None => Rings::None,
+        };
+        options.label = match self.label {
+            LabelOption::Name => LabelKind::Name,
+            LabelOption::Hd => LabelKind::Hd,
+            LabelOption::Hip => LabelKind::Hip,
+        };
+        let draws = |what| self.draw.contains(&what);
+        options.sky.constellations = draws(SkyOption::Constellations);
+        options.sky.deep_sky = draws(SkyOption::DeepSky);
+        options.sky.equatorial_grid = draws(SkyOption::Grid);
+        options.sky.horizontal_grid = draws(SkyOption::AltazGrid);
+        options.width_px = self.overlay_width;
+        options.format = match self.overlay_format {
+            FormatOption::Png => OverlayFormat::Png,
+            FormatOption::Jpg => OverlayFormat::Jpeg,
+            FormatOption::Svg => OverlayFormat::Svg,
+        };
+        options
+    }
+}

@@ -1,0 +1,44 @@
+//! The figures of the constellations.
+
+use super::view::View;
+use crate::base::coords::{Icrs, UnitVector};
+use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::overlay::labels::Room;
+use crate::sky::objects::constellations;
+
+const COLOR: Rgb = Rgb([120, 135, 190]);
+/// Size of the letters, in units of strokes.
+const LETTERS: f32 = 14.0;
+/// Part of a line that is left out at each of its stars.
+const GAP: f64 = 0.06;
+
+/// Draws the figures, and writes the names of the constellations.
+pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'_>) {
+    for constellation in constellations() {
+        for pair in constellation.lines.iter().flat_map(|line| line.windows(2)) {
+            let places: Vec<_> = points(&pair[0], &pair[1], view.step_rad())
+                .map(|point| view.of_catalog(&point))
+                .collect();
+            View::draw_line(canvas, &places, 1.0, COLOR);
+        }
+        let middle = view.of_catalog(&constellation.middle);
+        let name = constellation.name;
+        if let Some(at) = middle.and_then(|middle| room.around(name, middle, LETTERS)) {
+            canvas.text(name, at, LETTERS, COLOR.lighter());
+        }
+    }
+}
+
+/// Points between two stars.
+fn points(
+    from: &UnitVector<Icrs>,
+    to: &UnitVector<Icrs>,
+    step_rad: f64,
+) -> impl Iterator<Item = UnitVector<Icrs>> {
+    let (from, to) = (*from.as_vector(), *to.as_vector());
+    let steps = ((from - to).norm() / step_rad).ceil().max(1.0) as u32;
+    (0..=steps).map(move |step| {
+        let share = GAP + (1.0 - 2.0 * GAP) * f64::from(step) / f64::from(steps);
+        UnitVector::from_vector(from * (1.0 - share) + to * share)
+    })
+}
