@@ -3,7 +3,7 @@
 
     python3 scripts/check-manual.py target/release/starpipe [PAGE.md...]
 
-Takes the program, and the pages to check (default: README.md and all of docs/). Runs every line of
+Takes the program, and the pages to check (default: README.md, docs/ and docs/start/). Runs every line of
 their `sh` blocks that uses starpipe, and in the README the commands within sentences, in order, page
 by page in a new clone, with at most 20 frames or trials. Prints exit status and time of each, and
 exits with 1 if one fails. A frame that is not identified (exit status 3) is no failure.
@@ -30,7 +30,7 @@ def commands(page):
         if any(line.startswith("for ") for line in lines):
             lines = ["; ".join(lines).replace("do;", "do")]
         yield from (line for line in lines if "starpipe " in line and not line.startswith("python3"))
-    if page.name == "README.md":
+    if page.resolve() == ROOT / "README.md":
         yield from re.findall(r"`(starpipe [a-z][^`]*)`", page.read_text())
 
 
@@ -70,7 +70,8 @@ def run(page, program):
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
-    pages = [pathlib.Path(page) for page in sys.argv[2:]] or [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    docs = [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs/start").glob("*.md"))]
+    pages = [pathlib.Path(page) for page in sys.argv[2:]] or [ROOT / "README.md", *docs]
     results = [run(page, pathlib.Path(sys.argv[1])) for page in pages]
     sys.exit(0 if all(results) else 1)
 
