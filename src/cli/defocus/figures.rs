@@ -2,8 +2,8 @@
 //! of the paper, its spots and its surface.
 
 use crate::cli::plot::{
-    Axis, BLACK, BLUE, Cell, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet, WHITE,
-    figure_files,
+    Axis, BLACK, BLUE, Cell, ColorScale, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet,
+    WHITE, figure_files, two_digits,
 };
 use plotters::style::RGBColor;
 use starpipe::base::format::five_digits;
@@ -66,6 +66,15 @@ fn noise_axis(report: &DefocusReport) -> Axis {
     axis.within(from, to)
 }
 
+/// A noise with its unit; a part of full scale has none.
+fn noise_label(report: &DefocusReport, noise: f64) -> String {
+    let number = five_digits(two_digits(noise));
+    match report.noise_unit {
+        "e" => format!("noise {number} e"),
+        _ => format!("noise {number}"),
+    }
+}
+
 fn radius_axis(report: &DefocusReport) -> Axis {
     let [from, to] = report.radii_px;
     Axis::of("radius (px)").within(from, to)
@@ -88,9 +97,8 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     let lines: Vec<Vec<(f64, f64)>> = study.isolines.iter().map(outline).collect();
     // A third along the outline the lines are farthest apart.
     let labels = line_labels(study, &lines, |line| line.len() / 3);
-    let [least, most] = color_range_px(study).map(|error| five_digits(two_digits(error)));
     let measured = |_, _, point: &ErrorPoint| point.is_sound().then_some(point.rms_px);
-    let mut layers = vec![Layer::unnamed(BLACK, Marks::Cells(cells(study, measured)))];
+    let mut layers = vec![Layer::colored(cells(study, measured), scale(study))];
     if study.star.v_mag().is_none() {
         let paper = study.isolines.iter();
         let paper = paper.map(|line| paper_line(study, line.rms_px)).collect();
@@ -103,10 +111,7 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     layers.push(Layer::unnamed(WHITE, Marks::Lines(lines)));
     layers.push(Layer::unnamed(BLACK, labels));
     Panel {
-        title: title_of(
-            study,
-            &format!("error: {least} (blue) to {most} px (yellow)"),
-        ),
+        title: title_of(study, "error of a centroid, with lines of equal error"),
         x: noise_axis(report),
         y: radius_axis(report),
         layers,
@@ -125,10 +130,6 @@ fn line_labels(
         Some((noise, radius, five_digits(level.rms_px)))
     });
     Marks::Texts(labels.collect())
-}
-
-fn two_digits(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 /// Along the smallest radii, and back along the largest.
@@ -184,20 +185,31 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     let side = 2 * experiment.half_window_px + 1;
     let cell = |(number, value): (usize, &f64)| {
         let [column, row] = [number % side, number / side].map(|i| i as f64 - half);
-        let grey = (255.0 * value / experiment.peak).round() as u8;
         Cell {
             x: [column - 0.5, column + 0.5],
             y: [row - 0.5, row + 0.5],
-            color: RGBColor(grey, grey, grey),
+            color: grey(value / experiment.peak),
         }
     };
     let cells = pixels.iter().enumerate().map(cell).collect();
+    let levels = ColorScale {
+        title: "level".to_owned(),
+        ends: [0.0, experiment.peak],
+        is_log: false,
+        color_of: grey,
+    };
     Panel {
         title: format!("a spot of radius {} px", five_digits(spot_px)),
         x: Axis::of("column (px)"),
         y: Axis::of("row (px)"),
-        layers: vec![Layer::unnamed(BLACK, Marks::Cells(cells))],
+        layers: vec![Layer::colored(cells, levels)],
     }
+}
+
+/// From black at 0 to white at 1.
+fn grey(part: f64) -> RGBColor {
+    let level = (255.0 * part).round() as u8;
+    RGBColor(level, level, level)
 }
 
 /// A surface in the colors of the errors: the paper's figure 3.
@@ -207,7 +219,7 @@ fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surf
         title: format!("the fitted surface (eq. 13), {whose}"),
         x: noise_axis(report),
         y: radius_axis(report),
-        layers: vec![Layer::unnamed(BLACK, Marks::Cells(cells(study, value)))],
+        layers: vec![Layer::colored(cells(study, value), scale(study))],
     }
 }
 
@@ -221,7 +233,7 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
         Marks::Line(points.map(|(&spot_px, at)| (spot_px, at.rms_px)).collect())
     };
     let layers = a_few(count).flat_map(|(noise, color)| {
-        let label = five_digits(two_digits(grid.noises[noise]));
+        let label = noise_label(report, grid.noises[noise]);
         let integrated = study.expected.as_ref();
         let integrated = integrated.map(|all| Layer::new(label, color, line(all, noise)));
         let sampled = study.sampled.as_ref();
@@ -243,6 +255,16 @@ fn color_range_px(study: &StarStudy) -> [f64; 2] {
     errors.sort_by(f64::total_cmp);
     let at = |twentieths: usize| errors.get(errors.len() * twentieths / 20).copied();
     [at(1).unwrap_or(1e-3), at(19).unwrap_or(1.0)]
+}
+
+/// The colors of errors.
+fn scale(study: &StarStudy) -> ColorScale {
+    ColorScale {
+        title: "error (px)".to_owned(),
+        ends: color_range_px(study),
+        is_log: true,
+        color_of,
+    }
 }
 
 /// The grid as cells, with the colors of the errors that `error_px` gives; those beside each other
@@ -311,7 +333,7 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
             ),
             x: radius_axis(report),
             y: error(),
-            layers: over_radius(study),
+            layers: over_radius(report, study),
         },
         Panel {
             title: title_of(study, "over the noise, at four radii"),
@@ -335,13 +357,13 @@ fn at(curve: &ErrorCurve, radius: f64) -> Option<f64> {
     (first..=last).contains(&radius).then(|| curve.at(radius))
 }
 
-fn over_radius(study: &StarStudy) -> Vec<Layer> {
+fn over_radius(report: &DefocusReport, study: &StarStudy) -> Vec<Layer> {
     let grid = &study.errors.grid;
     let section = |(noise, color): (usize, RGBColor)| {
         let curve = study.curves[noise].as_ref()?;
         let radii = grid.spots_px.iter();
         let line = radii.filter_map(|&radius| Some((radius, at(curve, radius)?)));
-        let label = five_digits(two_digits(grid.noises[noise]));
+        let label = noise_label(report, grid.noises[noise]);
         Some(Layer::new(label, color, Marks::Line(line.collect())))
     };
     let mut layers: Vec<Layer> = a_few(grid.noises.len()).filter_map(section).collect();

@@ -63,7 +63,7 @@ fn panel(title: String, sweep: &Sweep, curves: Vec<Curve>, scenario: &Scenario) 
     let mut layers: Vec<Layer> = curves
         .map(|(curve, color)| Layer::new(curve.label, color, Marks::Line(curve.points)))
         .collect();
-    layers.push(Layer::unnamed(BLACK, Marks::Points(Vec::from_iter(dot))));
+    layers.extend(dot.map(|dot| Layer::new("this camera", BLACK, Marks::Points(vec![dot]))));
     Panel {
         title,
         x: Axis::log(sweep.parameter.title(), sweep.spacing == Spacing::Log).within(first, last),

@@ -1,6 +1,6 @@
 //! What is drawn in a panel: layers of marks of one kind and color.
 
-use super::style::GREY;
+use super::style::{BLACK, GREY};
 use plotters::style::RGBColor;
 
 /// Marks of one kind and color.
@@ -10,6 +10,33 @@ pub(crate) struct Layer {
     pub(crate) label: Option<String>,
     pub(crate) color: RGBColor,
     pub(crate) marks: Marks,
+    /// What the colors of its cells mean, where they are numbers.
+    pub(crate) scale: Option<ColorScale>,
+}
+
+/// Colors of numbers, shown as a bar beside the panel.
+#[derive(Clone)]
+pub(crate) struct ColorScale {
+    /// The quantity and its unit.
+    pub(crate) title: String,
+    /// The numbers of the first and the last color.
+    pub(crate) ends: [f64; 2],
+    /// Whether equal ratios have equal distances.
+    pub(crate) is_log: bool,
+    /// The color of a place between the ends, from 0 to 1.
+    pub(crate) color_of: fn(f64) -> RGBColor,
+}
+
+impl ColorScale {
+    /// The number at a place between the ends, from 0 to 1.
+    pub(super) fn number_at(&self, place: f64) -> f64 {
+        let [first, last] = self.ends;
+        if self.is_log {
+            first * (last / first).powf(place)
+        } else {
+            first + (last - first) * place
+        }
+    }
 }
 
 /// x, y, and an interval of y.
@@ -48,6 +75,7 @@ impl Layer {
             label: Some(label.into()),
             color,
             marks,
+            scale: None,
         }
     }
 
@@ -57,6 +85,15 @@ impl Layer {
             label: None,
             color,
             marks,
+            scale: None,
+        }
+    }
+
+    /// Cells whose colors are numbers.
+    pub(crate) fn colored(cells: Vec<Cell>, scale: ColorScale) -> Self {
+        Self {
+            scale: Some(scale),
+            ..Self::unnamed(BLACK, Marks::Cells(cells))
         }
     }
 

@@ -14,7 +14,9 @@ mod style;
 pub(crate) use axis::Axis;
 pub(crate) use figure::{Figure, Form};
 pub(crate) use files::{FigureForm, PlotFile, figure_files};
-pub(crate) use layer::{Cell, Dot, Layer, Marks};
+pub(crate) use layer::{Cell, ColorScale, Dot, Layer, Marks};
 pub(crate) use panel::Panel;
 pub(crate) use sheet::Sheet;
-pub(crate) use style::{Area, BLACK, BLUE, FONT, LETTERS_PX, ORANGE, WHITE, chart_on, plot_error};
+pub(crate) use style::{
+    Area, BLACK, BLUE, FONT, LETTERS_PX, ORANGE, WHITE, chart_on, plot_error, two_digits,
+};

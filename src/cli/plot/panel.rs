@@ -1,8 +1,10 @@
 //! A panel: layers over two axes, with a title and a legend above.
 
 use super::axis::{Axis, logarithmic};
-use super::layer::{Cell, Dot, Layer, Marks};
-use super::style::{Area, FONT, LETTERS_PX, MARGIN_PX, chart_on, draw_text, plot_error};
+use super::layer::{Cell, ColorScale, Dot, Layer, Marks};
+use super::style::{
+    Area, FONT, LETTERS_PX, MARGIN_PX, chart_on, draw_text, plot_error, two_digits,
+};
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::element::{CoordMapper, Drawable, PointCollection};
 use plotters::prelude::*;
@@ -17,6 +19,8 @@ const HEAD_PX: u32 = 50;
 const BELOW_PX: u32 = 44;
 /// Room left of the y axis.
 const LEFT_PX: u32 = 66;
+/// Room for a scale of colors.
+const BAR_PX: u32 = 84;
 /// Opacity of bars.
 const PALE: f64 = 0.45;
 
@@ -33,6 +37,16 @@ impl Panel {
     pub(super) fn draw<B: DrawingBackend>(&self, area: &Area<B>) -> anyhow::Result<()> {
         let (head, body) = area.split_vertically(HEAD_PX);
         self.draw_head(&head)?;
+        let scale = self.layers.iter().find_map(|layer| layer.scale.as_ref());
+        let body = match scale {
+            None => body,
+            Some(scale) => {
+                let (width, _) = body.dim_in_pixel();
+                let (body, side) = body.split_horizontally(width.saturating_sub(BAR_PX));
+                draw_scale(&side, scale)?;
+                body
+            }
+        };
         let points: Vec<_> = self.layers.iter().flat_map(Layer::points).collect();
         let x = self.x.range(points.iter().map(|point| point.0));
         let y = self.y.range(points.iter().map(|point| point.1));
@@ -107,6 +121,31 @@ impl Panel {
     }
 }
 
+/// Draws a bar of colors from bottom to top, with numbers beside it and its title above.
+fn draw_scale<B: DrawingBackend>(area: &Area<B>, scale: &ColorScale) -> anyhow::Result<()> {
+    const STEPS: i32 = 64;
+    const NUMBERS: i32 = 4;
+    const WIDTH: i32 = 14;
+    const TITLE_Y: i32 = 10;
+    const TOP: i32 = 24;
+    let (_, height) = area.dim_in_pixel();
+    let bottom = height as i32 - BELOW_PX as i32 - MARGIN_PX as i32;
+    let y = |step: i32, steps: i32| bottom - (bottom - TOP) * step / steps;
+    draw_text(area, &scale.title, LETTERS_PX, (0, TITLE_Y))?;
+    for step in 0..STEPS {
+        let color = (scale.color_of)((f64::from(step) + 0.5) / f64::from(STEPS));
+        let corners = [(0, y(step + 1, STEPS)), (WIDTH, y(step, STEPS))];
+        area.draw(&Rectangle::new(corners, color.filled()))
+            .map_err(plot_error)?;
+    }
+    for number in 0..=NUMBERS {
+        let value = scale.number_at(f64::from(number) / f64::from(NUMBERS));
+        let text = five_digits(two_digits(value));
+        draw_text(area, &text, LETTERS_PX, (WIDTH + 6, y(number, NUMBERS)))?;
+    }
+    Ok(())
+}
+
 /// Draws what a layer's marks look like, to the right of `place`.
 fn draw_legend_mark<B: DrawingBackend>(
     area: &Area<B>,
@@ -116,7 +155,7 @@ fn draw_legend_mark<B: DrawingBackend>(
     let (x, y) = place;
     let color = layer.color;
     match layer.marks {
-        Marks::Dots(_) => area.draw(&Circle::new((x + 8, y), 4, color.filled())),
+        Marks::Dots(_) | Marks::Points(_) => area.draw(&Circle::new((x + 8, y), 4, color.filled())),
         Marks::Bars(_) => {
             let corners = [(x, y - 6), (x + 16, y + 6)];
             area.draw(&Rectangle::new(corners, color.mix(PALE).filled()))

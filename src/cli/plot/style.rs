@@ -56,6 +56,11 @@ pub(super) fn draw_text<B: DrawingBackend>(
     area.draw_text(text, &style, place).map_err(plot_error)
 }
 
+/// A number as figures label it.
+pub(crate) fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
 /// An error of a backend, which borrows the drawing, as an error that does not.
 pub(crate) fn plot_error(error: impl Display) -> anyhow::Error {
     anyhow::anyhow!("{error}")
