@@ -28,6 +28,8 @@ mod shown;
 #[doc(hidden)]
 pub use canvas::FONT;
 
+#[cfg(feature = "page")]
+use crate::frame::Frame;
 use crate::frame::OVERLAY_TEXT;
 use crate::pipeline::Solution;
 use crate::sky::catalog::Catalog;
@@ -93,6 +95,12 @@ pub(super) fn photograph(
     options: &OverlayOptions,
 ) -> RgbImage {
     Picture::of(shown, solution.background.as_ref(), options.stretch).into_image()
+}
+
+/// A frame without marks, reduced to at most `most_px` columns.
+#[cfg(feature = "page")]
+pub(super) fn thumbnail(frame: &Frame<'_>, most_px: usize) -> RgbImage {
+    Picture::reduced(frame, frame.width.div_ceil(most_px)).into_image()
 }
 
 /// Encodes the picture, fast rather than small.

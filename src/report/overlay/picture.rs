@@ -41,16 +41,8 @@ impl Picture {
             1
         };
         let reduced = longer.div_ceil(REDUCE_ABOVE_PX).max(1);
-        let (width, height) = (
-            frame.width.div_ceil(reduced),
-            frame.height.div_ceil(reduced),
-        );
-        let size = Size::new(width, height);
-        let squares = Squares {
-            frame,
-            side: reduced,
-            size,
-        };
+        let squares = Squares::of(frame, reduced);
+        let Size { width, height } = squares.size;
         let small = match stretch {
             Stretch::None => photograph(&squares, shown.colors, None),
             Stretch::Soft => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
@@ -71,6 +63,19 @@ impl Picture {
             pixels,
             enlarged,
             reduced,
+        }
+    }
+
+    /// `frame` in grey, with a dark sky brightened, each `side` × `side` pixels as one.
+    #[cfg(feature = "page")]
+    pub(super) fn reduced(frame: &Frame<'_>, side: usize) -> Self {
+        let squares = Squares::of(frame, side);
+        Self {
+            width: squares.size.width,
+            height: squares.size.height,
+            pixels: photograph(&squares, None, Some(SKY_LEVELS)),
+            enlarged: 1,
+            reduced: side,
         }
     }
 
@@ -109,7 +114,13 @@ struct Squares<'a> {
     size: Size,
 }
 
-impl Squares<'_> {
+impl<'a> Squares<'a> {
+    /// Those of a frame.
+    fn of(frame: &'a Frame<'a>, side: usize) -> Self {
+        let size = Size::new(frame.width.div_ceil(side), frame.height.div_ceil(side));
+        Self { frame, side, size }
+    }
+
     /// Means over the squares of what `fill` writes for a row of pixels; NaN where there is no value.
     fn means(&self, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
         let Self { frame, side, size } = *self;
