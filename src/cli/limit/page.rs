@@ -5,10 +5,12 @@ use super::{changes_nothing, figures};
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, figure, options, table};
 use starpipe::base::format::five_digits;
-use starpipe::model::sensitivity::{Parameter, PredictionRow, Scenario, Spacing, Sweep};
+use starpipe::model::sensitivity::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
 use starpipe::report::page::{Fact, Page};
 use starpipe::sky::catalog::Catalog;
 
+const PAPER: &str =
+    "The equations are used as the paper's authors did. --reading physical corrects the physics.";
 /// What a prediction alone is swept over in the figures of its page.
 const SWEPT: [&str; 2] = ["exposure_s", "aperture_mm"];
 /// Its values go from this part to this multiple of the scenario's.
@@ -35,6 +37,9 @@ pub(super) fn of(
         ],
         ..Page::default()
     };
+    if scenario.reading == Reading::Paper {
+        page.notes.push(PAPER.to_owned());
+    }
     let own = match &of_scenario {
         Ok(row) => {
             page.answer = answer(row);
@@ -55,7 +60,7 @@ pub(super) fn of(
     let drawn = if given.is_empty() {
         default_sweeps(scenario)
     } else {
-        page.notes = notes(rows);
+        page.notes.extend(notes(rows));
         given.clone()
     };
     for sweep in &drawn {
