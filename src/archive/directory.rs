@@ -93,6 +93,11 @@ impl Archive {
         &self.directory
     }
 
+    /// What its tables depend on.
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
     /// Its frames and parts.
     pub fn plan(&self) -> &Plan {
         &self.plan

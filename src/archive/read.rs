@@ -55,6 +55,15 @@ pub(super) fn number(row: &Row, column: &str) -> Option<f64> {
     }
 }
 
+/// The value of a column, if it is a count.
+pub(super) fn count(row: &Row, column: &str) -> Option<u64> {
+    match field(row, column)? {
+        Field::ULong(value) => Some(*value),
+        Field::Long(value) => u64::try_from(*value).ok(),
+        _ => None,
+    }
+}
+
 /// The value of a column of text; empty where there is none.
 pub(super) fn text<'r>(row: &'r Row, column: &str) -> &'r str {
     match field(row, column) {

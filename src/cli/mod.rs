@@ -2,7 +2,7 @@
 //!
 //! - Each command is one file or folder: its arguments, and a function that returns an
 //!   [`exit::Outcome`].
-//! - `options`, `input`, `output`, `batch`, `progress` and `plot` hold what several commands share.
+//! - `options`, `input`, `output`, `batch`, `progress`, `plot` and `page` hold what several commands share.
 //! - Only `run` and the reports of `solving` and `track`, which appear frame by frame, write to
 //!   standard output.
 
@@ -24,6 +24,7 @@ mod input;
 mod limit;
 mod options;
 mod output;
+mod page;
 mod plot;
 mod process;
 mod progress;

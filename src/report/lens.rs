@@ -188,7 +188,9 @@ impl LensReport {
         text
     }
 
-    fn lines(&self) -> Vec<(&'static str, String)> {
+    /// What is said of the lens, each with its name.
+    #[doc(hidden)]
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
         let lens = &self.lens;
         let mirrored = if lens.mirrored { ", mirrored" } else { "" };
         let known = lens.valid_to_deg.map_or_else(

@@ -33,6 +33,7 @@ mod no_sky;
 mod odd_use;
 mod orientation;
 mod output_files;
+mod pages;
 mod photometry;
 mod real_sky;
 mod robustness;

@@ -15,9 +15,27 @@ impl DarksReport {
             self.width,
             self.height
         );
-        let mut line = |label: &str, value: String| {
+        for (label, value) in self.lines() {
             let _ = writeln!(text, "  {label:<15}{value}");
-        };
+        }
+        for missing in self.missing_texts() {
+            let _ = writeln!(text, "  {:<15}{missing}", "not known");
+        }
+        text
+    }
+
+    /// What is not known, and why.
+    #[doc(hidden)]
+    pub fn missing_texts(&self) -> impl Iterator<Item = String> {
+        let missing = self.missing.iter();
+        missing.map(|(what, reason)| format!("{}: {reason}", what.replace('_', " ")))
+    }
+
+    /// What was measured, each with its name.
+    #[doc(hidden)]
+    pub fn lines(&self) -> Vec<(String, String)> {
+        let mut lines = Vec::new();
+        let mut line = |label: &str, value: String| lines.push((label.to_owned(), value));
         line(
             "mean",
             with(self.mean_adu, "ADU", self.relative_mean.map(relative)),
@@ -55,10 +73,7 @@ impl DarksReport {
             );
         }
         line("hot pixels", hot_pixels_text(&self.hot_pixels));
-        for (what, reason) in &self.missing {
-            line("not known", format!("{}: {reason}", what.replace('_', " ")));
-        }
-        text
+        lines
     }
 }
 

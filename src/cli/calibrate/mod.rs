@@ -3,6 +3,7 @@
 mod exports;
 mod figure;
 mod lens_file;
+mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::FrameList;
@@ -10,9 +11,10 @@ use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::options::frames::{FrameOptions, MemoryOption};
 use super::options::hints::HintOptions;
-use super::output::files::write_whole;
+use super::output::files::{NewFile, write_whole};
 use super::output::messages::report_error;
 use super::output::rows::json_line;
+use super::page::HtmlOption;
 use super::plot::PlotFile;
 use super::process::CalibrationOptions;
 use super::progress::frames_bar;
@@ -22,6 +24,7 @@ use exports::ExportOptions;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
 use starpipe::report::LensReport;
+use starpipe::report::page::Fact;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -29,6 +32,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     starpipe calibrate night/ -o camera.toml\n  \
     starpipe calibrate --site 52.22,4.42 --camera camera.toml night/*.fits -o camera.toml --force\n  \
+    starpipe calibrate night/ -o camera.toml --html\n  \
     starpipe calibrate night/ --opencv lens.yaml\n  \
     starpipe process --camera camera.toml night.fits\n\n\
     Twenty frames or more, whose stars are spread over the whole frame, measure a lens well. `process`, `track` and\n\
@@ -51,6 +55,8 @@ pub(crate) struct CalibrateArgs {
     /// Figure of the stars over the frame, and of their residuals
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
     plot: Option<PlotFile>,
+    #[command(flatten)]
+    html: HtmlOption,
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
     format: PageFormat,
@@ -64,17 +70,32 @@ pub(crate) struct CalibrateArgs {
 pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandError> {
     if !arguments.force {
         let files = arguments.out.as_deref().into_iter();
-        lens_file::check(files.chain(arguments.exports.paths()))?;
+        let files = files.chain(arguments.exports.paths());
+        lens_file::check(files.chain(arguments.page_path().as_deref()))?;
     }
     let plan = arguments.plan()?;
     let (paths, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
-    let (frames, left_out, unread) = solve(&arguments, &plan, &paths)?;
+    if arguments.force {
+        arguments
+            .html
+            .checked_path(&paths, || arguments.default_page())?;
+    }
+    let SolvedFrames {
+        frames,
+        left_out,
+        unread,
+        catalog,
+    } = solve(&arguments, &plan, &paths)?;
     if unread == paths.len() {
         return Ok(Exit::Failure.into());
     }
     let measured = measure(frames, left_out).map_err(anyhow::Error::from)?;
-    write(&arguments, &measured)?;
     let report = LensReport::new(&measured);
+    let page = arguments.page_path().map(|path| -> anyhow::Result<_> {
+        let page = page::of(&measured, &report, unread, catalog)?;
+        super::page::file(&path, &page)
+    });
+    write(&arguments, &measured, page.transpose()?)?;
     let has_failed = failed || unread > 0;
     Ok(Outcome {
         text: match arguments.format {
@@ -90,6 +111,17 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandErro
 }
 
 impl CalibrateArgs {
+    /// The file of the page, if there is to be one.
+    fn page_path(&self) -> Option<PathBuf> {
+        self.html.path(|| self.default_page())
+    }
+
+    /// Beside the file of the lens, if there is one.
+    fn default_page(&self) -> PathBuf {
+        let lens = self.out.as_ref();
+        lens.map_or("calibrate.html".into(), |path| path.with_extension("html"))
+    }
+
     fn plan(&self) -> Result<Plan, CommandError> {
         let camera = self.hints.description()?;
         let mut options = self.hints.options()?;
@@ -119,15 +151,24 @@ impl Sink for Stars {
     }
 }
 
-/// The frames with their stars, those that are left out, and the number of files that are no frames.
+/// What a lens is measured in.
+struct SolvedFrames {
+    frames: Vec<LensFrame>,
+    left_out: Vec<LeftOutFrame>,
+    /// Files that are no frames.
+    unread: usize,
+    /// Where their stars are from.
+    catalog: Fact,
+}
+
 fn solve(
     arguments: &CalibrateArgs,
     plan: &Plan,
     paths: &[PathBuf],
-) -> Result<(Vec<LensFrame>, Vec<LeftOutFrame>, usize), CommandError> {
+) -> Result<SolvedFrames, CommandError> {
     let progress = frames_bar(paths.len() as u64);
     let (mut frames, mut left_out, mut unread) = (Vec::new(), Vec::new(), 0);
-    arguments.catalog.with_index(|pool, indexed| {
+    let catalog = arguments.catalog.with_index(|pool, indexed| {
         let solver = Solver {
             pool,
             inputs: &Inputs::Frames(PageChoice::default()),
@@ -149,13 +190,22 @@ fn solve(
             }
             ControlFlow::Continue(())
         });
-        Ok(())
+        Ok(super::page::catalog(indexed.catalog()))
     })?;
     progress.finish_and_clear();
-    Ok((frames, left_out, unread))
+    Ok(SolvedFrames {
+        frames,
+        left_out,
+        unread,
+        catalog,
+    })
 }
 
-fn write(arguments: &CalibrateArgs, measured: &LensCalibration) -> Result<(), CommandError> {
+fn write(
+    arguments: &CalibrateArgs,
+    measured: &LensCalibration,
+    page: Option<NewFile>,
+) -> Result<(), CommandError> {
     let mut files = arguments.exports.files(measured)?;
     if let Some(path) = &arguments.out {
         let text = lens_file::text(arguments.hints.camera.as_deref(), measured)?;
@@ -164,5 +214,6 @@ fn write(arguments: &CalibrateArgs, measured: &LensCalibration) -> Result<(), Co
     if let Some(plot) = &arguments.plot {
         files.push(plot.with(&figure::sheet(measured))?);
     }
+    files.extend(page);
     Ok(write_whole(&files)?)
 }

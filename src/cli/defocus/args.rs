@@ -5,6 +5,7 @@ use crate::cli::options::scenario::ScenarioOptions;
 use crate::cli::options::steps::Steps;
 use crate::cli::options::threads::ThreadOptions;
 use crate::cli::options::values;
+use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
 use clap::{Args, ValueEnum};
 use starpipe::model::defocus::Centroiding;
@@ -79,6 +80,8 @@ pub(crate) struct DefocusArgs {
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg, requires = "out")]
     pub(super) figures: FigureForm,
+    #[command(flatten)]
+    pub(super) html: HtmlOption,
     #[command(flatten)]
     pub(super) threads: ThreadOptions,
 }

@@ -33,6 +33,11 @@ pub(super) fn of(
     studies: &[StarStudy],
     form: FigureForm,
 ) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    figure_files(sheets(report, studies), form)
+}
+
+/// The figures with their names.
+pub(super) fn sheets(report: &DefocusReport, studies: &[StarStudy]) -> Vec<(&'static str, Sheet)> {
     let errors = studies.iter().map(|study| errors(report, study)).collect();
     let sections = studies
         .iter()
@@ -54,7 +59,7 @@ pub(super) fn of(
             sheets.push(("accuracy-and-reach", Sheet::of_one(panel)));
         }
     }
-    figure_files(sheets, form)
+    sheets
 }
 
 fn noise_axis(report: &DefocusReport) -> Axis {

@@ -3,31 +3,50 @@
 mod args;
 mod darks;
 mod figures;
+mod page;
 mod plan;
 
 pub(crate) use args::DefocusArgs;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files::write_into;
+use super::output::files::{make_directory, write_whole};
 use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_indented, json_line};
 use super::progress::bar;
 use starpipe::Interrupt;
 use starpipe::model::defocus::Lens;
 use starpipe::study::defocus::{Caller, DefocusReport, GridRow, Plan, StarStudy};
-use std::path::Path;
+use std::path::PathBuf;
+
+const UNMET: &str = "no radius meets a required error";
 
 /// `starpipe defocus`
 pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> {
     let pool = arguments.threads.pool()?;
+    let page_path = page_path(arguments)?;
     let plan = plan::plan(arguments, &pool)?;
     let studies = run(&plan, &pool)?;
     let report = DefocusReport::new(&plan, &studies);
-    warn_if_too_sharp(&report);
-    if let Some(directory) = &arguments.out {
-        save(directory, arguments, &report, &studies)?;
+    let warnings = too_sharp(&report);
+    for warning in &warnings {
+        report_warning(warning);
     }
+    let mut files = match &arguments.out {
+        Some(directory) => {
+            make_directory(directory)?;
+            let files = files(arguments, &report, &studies)?.into_iter();
+            files
+                .map(|(name, content)| (directory.join(name), content))
+                .collect()
+        }
+        None => Vec::new(),
+    };
+    if let Some(path) = &page_path {
+        let page = page::of(arguments, &report, &studies, warnings)?;
+        files.push(crate::cli::page::file(path, &page)?);
+    }
+    write_whole(&files)?;
     let text = match arguments.format {
         Format::Text => report.to_text(),
         Format::Json => json_line(&report)?,
@@ -36,10 +55,19 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     let exit = if report.is_met() {
         Exit::Success
     } else {
-        report_warning("no radius meets a required error");
+        report_warning(UNMET);
         Exit::Unmet
     };
     Ok(Outcome { text, exit })
+}
+
+/// The file of the page, if there is to be one.
+fn page_path(arguments: &DefocusArgs) -> Result<Option<PathBuf>, CommandError> {
+    let scenario = arguments.scenario.files().cloned();
+    let inputs: Vec<PathBuf> = scenario.chain(arguments.darks.iter().cloned()).collect();
+    let directory = arguments.out.clone().unwrap_or_default();
+    let default = || directory.join("defocus.html");
+    arguments.html.checked_path(&inputs, default)
 }
 
 fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> {
@@ -56,41 +84,42 @@ fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> 
     Ok(studies?)
 }
 
-/// No lens makes a spot that is sharper than diffraction.
-fn warn_if_too_sharp(report: &DefocusReport) {
+/// No lens makes a spot that is sharper than diffraction: a warning for each star with such a best spot.
+fn too_sharp(report: &DefocusReport) -> Vec<String> {
     let Some(least_px) = report.lens.as_ref().map(Lens::diffraction_px) else {
-        return;
+        return Vec::new();
     };
-    for star in &report.stars {
-        if star.best.radius.radius_px < least_px {
-            report_warning(format_args!(
-                "the best radius, {:.2} px, is below that of diffraction, {least_px:.2} px",
-                star.best.radius.radius_px
-            ));
-        }
-    }
+    let best = report.stars.iter().map(|star| star.best.radius.radius_px);
+    let too_sharp = best.filter(|radius_px| *radius_px < least_px);
+    let warning = |radius_px| {
+        format!(
+            "the best radius, {radius_px:.2} px, is below that of diffraction, {least_px:.2} px"
+        )
+    };
+    too_sharp.map(warning).collect()
 }
 
 fn grid_table(studies: &[StarStudy]) -> anyhow::Result<String> {
     csv_table(studies.iter().flat_map(GridRow::rows))
 }
 
-/// Writes all files, or none.
-fn save(
-    directory: &Path,
+fn curve_table(report: &DefocusReport) -> anyhow::Result<String> {
+    csv_table(report.stars.iter().flat_map(|star| &star.curve))
+}
+
+/// Names and contents of the files for `--out`.
+fn files(
     arguments: &DefocusArgs,
     report: &DefocusReport,
     studies: &[StarStudy],
-) -> anyhow::Result<()> {
-    let curve = csv_table(report.stars.iter().flat_map(|star| &star.curve))?;
+) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let texts = [
         ("grid.csv", grid_table(studies)?),
-        ("curve.csv", curve),
+        ("curve.csv", curve_table(report)?),
         ("defocus.json", json_indented(report)?),
         ("defocus.txt", report.to_text()),
     ];
     let texts = texts.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     let figures = figures::of(report, studies, arguments.figures)?;
-    write_into(directory, texts.into_iter().chain(figures))?;
-    Ok(())
+    Ok(texts.into_iter().chain(figures).collect())
 }

@@ -121,10 +121,15 @@ fn chosen_v_mag(scenario: &Scenario) -> Result<f64, Error> {
         DefocusError::NoLimit => anyhow!("{error}; --vmag gives one"),
         other => other.into(),
     })?;
-    report_warning(format_args!(
-        "no --vmag: the star has V {v_mag}, about {BRIGHTER_THAN_LIMIT_MAG} brighter than the camera's limit"
-    ));
+    report_warning(chosen_for_you(v_mag));
     Ok(v_mag)
+}
+
+/// What is said of a star that nobody chose.
+pub(super) fn chosen_for_you(v_mag: f64) -> String {
+    format!(
+        "no --vmag: the star has V {v_mag}, about {BRIGHTER_THAN_LIMIT_MAG} brighter than the camera's limit"
+    )
 }
 
 /// Adds which option helps.

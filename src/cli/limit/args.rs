@@ -3,6 +3,7 @@
 use crate::cli::options::format::Format;
 use crate::cli::options::scenario::ScenarioOptions;
 use crate::cli::options::steps::named_steps;
+use crate::cli::page::HtmlOption;
 use crate::cli::plot::PlotFile;
 use clap::{ArgGroup, Args};
 use starpipe::model::sensitivity;
@@ -15,6 +16,7 @@ use std::str::FromStr;
     starpipe limit --camera camera.toml --exposure 0.2 --sky-mag-arcsec2 20 --format json\n  \
     starpipe limit --preset experiment-1 --sweep aperture_mm=5:200:40 --plot aperture.svg --format csv\n  \
     starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
+    starpipe limit --preset imx174-35mm --html=limit.html\n  \
     starpipe limit --figures figures\n\n\
     The limit is that of the paper: the signal of the star's brightest pixel is --snr times its noise.\n\
     Every number of the camera and of the conditions has an option; docs/sensitivity.md has the\n\
@@ -40,8 +42,10 @@ pub(crate) struct LimitArgs {
     pub(crate) plot: Option<PlotFile>,
     /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s
     /// [default camera: experiment-1]
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["sweep", "plot", "format"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["sweep", "plot", "format", "html"])]
     pub(crate) figures: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) html: HtmlOption,
 }
 
 /// A sweep of the prediction.

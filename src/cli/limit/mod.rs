@@ -2,6 +2,7 @@
 
 mod args;
 mod figures;
+mod page;
 
 pub(crate) use args::LimitArgs;
 
@@ -14,7 +15,7 @@ use super::output::rows::{csv_table, json_lines};
 use anyhow::Context;
 use starpipe::model::sensitivity::{PredictionRow, Scenario};
 use starpipe::sky::catalog::Catalog;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// More sweeps than this are a mistake; a figure of them would be unreadable.
 const MAX_SWEEPS: usize = 64;
@@ -32,18 +33,33 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Outcome, CommandError> {
     if let Some(directory) = &arguments.figures {
         return paper_figures(directory, &scenario);
     }
+    let inputs: Vec<PathBuf> = arguments.scenario.files().cloned().collect();
+    let page_path = arguments
+        .html
+        .checked_path(&inputs, || page_path(arguments))?;
     let rows = rows(arguments, &scenario)?;
+    let mut files = Vec::new();
     if let Some(plot) = &arguments.plot {
         let sweeps = arguments.sweep.iter().map(|sweep| &sweep.0);
         let sheet = figures::of_sweeps(sweeps, &scenario)?;
-        let file = plot.with(&sheet).context("drawing the figure")?;
-        write_whole(&[file])?;
+        files.push(plot.with(&sheet).context("drawing the figure")?);
     }
+    if let Some(path) = &page_path {
+        let page = page::of(&rows, arguments, &scenario)?;
+        files.push(crate::cli::page::file(path, &page)?);
+    }
+    write_whole(&files)?;
     Ok(Outcome::success(match arguments.format {
         Format::Text => PredictionRow::to_text(&rows),
         Format::Json => json_lines(rows.iter())?,
         Format::Csv => csv_table(rows.iter().map(PredictionRow::table_row))?,
     }))
+}
+
+/// Where the page is written if no file is named: beside the figure, if there is one.
+fn page_path(arguments: &LimitArgs) -> PathBuf {
+    let figure = arguments.plot.as_ref();
+    figure.map_or("limit.html".into(), |plot| plot.path.with_extension("html"))
 }
 
 /// Refuses to overwrite an input with the figure.
@@ -74,14 +90,15 @@ fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<PredictionRow>
         let rows = PredictionRow::of_sweep(scenario, preset, sweep).map_err(CommandError::usage)?;
         // Some parameters matter in one reading only, or for one detector only.
         if PredictionRow::have_same_limits(&rows) {
-            report_warning(format_args!(
-                "{} changes nothing: the limits are the same at each of its values",
-                sweep.parameter.name()
-            ));
+            report_warning(changes_nothing(sweep.parameter.name()));
         }
         all.extend(rows);
     }
     Ok(all)
+}
+
+fn changes_nothing(parameter: &str) -> String {
+    format!("{parameter} changes nothing: the limits are the same at each of its values")
 }
 
 /// Writes the eleven figures of the paper and a sheet of all of them.

@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 /// This much of a file shows whether it is a result: the longest header has fewer bytes.
 const HEAD_BYTES: u64 = 1 << 16;
 
+const OTHER_DIRECTORY: &str = "choose another directory for --out";
+
 /// Refuses inputs whose results would overwrite each other, an input, or a file that is not a
 /// result.
 pub(crate) fn check(
@@ -48,10 +50,17 @@ pub(crate) fn check_results(inputs: &[PathBuf], results: &[PathBuf]) -> Result<(
 /// Refuses to overwrite the file `output` with the results of `input`, unless it is such a result.
 pub(crate) fn check_output(output: &Path, input: &Path) -> anyhow::Result<()> {
     let results = format!("the results of {}", input.display());
-    match refusal(output, &HashSet::new(), &results) {
+    match refusal(output, &HashSet::new(), &results, OTHER_DIRECTORY) {
         Some(refusal) => bail!(refusal),
         None => Ok(()),
     }
+}
+
+/// Refuses a `page` that would overwrite an input, or a file that is not such a page.
+pub(crate) fn check_page(inputs: &[PathBuf], page: &Path) -> Result<(), CommandError> {
+    let advice = "give the page another name with --html=FILE";
+    let refusal = refusal(page, &found(inputs), "the page", advice);
+    refusal.map_or(Ok(()), |refusal| Err(CommandError::Usage(refusal)))
 }
 
 /// The inputs that exist, with links resolved.
@@ -67,12 +76,17 @@ fn check_result(
     inputs_found: &HashSet<PathBuf>,
     results: &str,
 ) -> Result<(), CommandError> {
-    let refusal = refusal(output, inputs_found, results).map(CommandError::Usage);
-    refusal.map_or(Ok(()), Err)
+    let refusal = refusal(output, inputs_found, results, OTHER_DIRECTORY);
+    refusal.map_or(Ok(()), |refusal| Err(CommandError::Usage(refusal)))
 }
 
-/// Why `results` may not be written to `output`.
-fn refusal(output: &Path, inputs_found: &HashSet<PathBuf>, results: &str) -> Option<String> {
+/// Why `results` may not be written to `output`, and what to do.
+fn refusal(
+    output: &Path,
+    inputs_found: &HashSet<PathBuf>,
+    results: &str,
+    advice: &str,
+) -> Option<String> {
     let existing = output.canonicalize().ok()?;
     let extension = output.extension().and_then(OsStr::to_str);
     let what = if inputs_found.contains(&existing) {
@@ -83,7 +97,7 @@ fn refusal(output: &Path, inputs_found: &HashSet<PathBuf>, results: &str) -> Opt
         "a file that starpipe did not write:"
     };
     Some(format!(
-        "{results} would overwrite {what} {}; choose another directory for --out",
+        "{results} would overwrite {what} {}; {advice}",
         output.display(),
     ))
 }
@@ -134,7 +148,7 @@ fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
         "vot" | "ecsv" => tables::is_text_table(head),
         "png" | "jpg" => frame::is_overlay(head),
         "svg" => overlay::is_svg(head),
-        "html" => page::is_page(head),
+        "html" | "htm" => page::is_page(head),
         "reg" => head.starts_with(regions::FIRST_LINE.as_bytes()),
         _ => wcs::is_header(head),
     }

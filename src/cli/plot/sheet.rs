@@ -1,6 +1,7 @@
 //! Panels side by side.
 
 use super::figure::Figure;
+use super::layer::Marks;
 use super::panel::Panel;
 use super::style::{Area, LETTERS_PX, draw_text};
 use plotters::prelude::DrawingBackend;
@@ -33,6 +34,22 @@ impl Sheet {
     /// A panel that stands alone.
     pub(crate) fn of_one(panel: Panel) -> Self {
         Self::new(vec![panel], 1)
+    }
+
+    /// Whether nothing is drawn.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.panels.is_empty()
+    }
+
+    /// Whether it needs the whole width of a page.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.abreast > 1
+    }
+
+    /// Whether areas have colors with a meaning.
+    pub(crate) fn is_colored(&self) -> bool {
+        let mut layers = self.panels.iter().flat_map(|panel| &panel.layers);
+        layers.any(|layer| matches!(layer.marks, Marks::Cells(_)))
     }
 
     fn lines(&self) -> usize {

@@ -4,6 +4,7 @@ use super::sweep::StudySweep;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
 use crate::cli::options::setup::SetupOptions;
+use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -18,7 +19,7 @@ pub(crate) enum Suite {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe validate --camera camera.toml --count 1000 --seed 1 --out validation\n  \
-    starpipe validate --preset nanosat-tracker --exposure 0.2 --scale-unknown --out validation\n  \
+    starpipe validate --preset nanosat-tracker --exposure 0.2 --scale-unknown --out validation --html\n  \
     starpipe validate --camera camera.toml --count 500 --sweep read_noise_e=1:30:7:log --out study\n  \
     starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n  \
     starpipe validate --camera camera.toml --count 200 --suite hard --out hard\n\n\
@@ -56,6 +57,8 @@ pub(crate) struct ValidateArgs {
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg)]
     pub(crate) figures: FigureForm,
+    #[command(flatten)]
+    pub(crate) html: HtmlOption,
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
     pub(crate) format: PageFormat,

@@ -1,8 +1,6 @@
 //! The figures of a run and of a study.
 
-use crate::cli::plot::{
-    Axis, BLUE, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet, figure_files,
-};
+use crate::cli::plot::{Axis, BLUE, Dot, Layer, Marks, ORANGE, Panel, Sheet};
 use plotters::style::RGBColor;
 use starpipe::base::statistics::normal_density;
 use starpipe::study::validation::{
@@ -14,11 +12,8 @@ use starpipe::study::validation::{
 const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
 const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
 
-/// The figures of a run.
-pub(super) fn of_run(
-    summary: &Summary,
-    form: FigureForm,
-) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+/// The figures of a run with their names.
+pub(super) fn of_run(summary: &Summary) -> Vec<(&'static str, Sheet)> {
     let mut sheets = vec![
         ("identification", identification(&summary.identification)),
         ("completeness", completeness(&summary.completeness)),
@@ -27,21 +22,15 @@ pub(super) fn of_run(
         ("faintest", faintest(&summary.faintest)),
     ];
     sheets.extend(summary.attitude.as_ref().map(|a| ("attitude", attitude(a))));
-    figure_files(sheets, form)
+    sheets
 }
 
-/// The figures of a study, one for each parameter.
-pub(super) fn of_study(
-    rows: &[StudyRow],
-    form: FigureForm,
-) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+/// The figures of a study, one for each parameter, with their names.
+pub(super) fn of_study(rows: &[StudyRow]) -> Vec<(&'static str, Sheet)> {
     let parameters = rows.chunk_by(|a, b| a.parameter == b.parameter);
-    figure_files(
-        parameters
-            .map(|rows| (rows[0].parameter, study(rows)))
-            .collect(),
-        form,
-    )
+    parameters
+        .map(|rows| (rows[0].parameter, study(rows)))
+        .collect()
 }
 
 fn identification(found: &IdentificationSummary) -> Sheet {

@@ -2,6 +2,8 @@
 
 mod args;
 mod figures;
+mod frames;
+mod page;
 mod parquet;
 mod run;
 mod shared;
@@ -14,9 +16,11 @@ pub(crate) use args::ValidateArgs;
 
 use super::exit::{CommandError, Outcome};
 use super::options::format::PageFormat;
+use super::output::files::write_whole;
 use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use shared::Shared;
+use starpipe::report::page::{Page, Thumbnail};
 use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol, StudyRow};
 
 /// `starpipe validate`
@@ -32,34 +36,47 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
         Some(Suite::Hard) => HARD_SUITE.len(),
         None => study_runs.len().max(1),
     } as u64;
+    let default = || arguments.out.join("validate.html");
+    let page_path = arguments.html.checked_path(&[], default)?;
     let text = arguments.catalog.with_index(|pool, indexed| {
         let shared = Shared {
             indexed,
             pool,
             frames: arguments.count,
             figures: arguments.figures,
+            pictures: page_path
+                .as_ref()
+                .map(|_| Thumbnail::MOST.div_ceil(runs as usize)),
             progress: frames_bar_with_speed(arguments.count * runs),
         };
-        let text = if arguments.suite.is_some() {
-            let rows = suite::run(&arguments.out, &protocol, &shared)?;
-            match arguments.format {
+        let camera = &protocol.setup.scenario.camera.name;
+        let (text, page): (String, Page) = if arguments.suite.is_some() {
+            let (rows, failed) = suite::run(&arguments.out, &protocol, &shared)?;
+            let text = match arguments.format {
                 PageFormat::Text => HardRow::to_text(&rows),
                 PageFormat::Json => json_lines(rows.iter())?,
-            }
+            };
+            (text, page::of_suite(camera, &rows, failed)?)
         } else if study_runs.is_empty() {
-            let summary = run::run(&arguments.out, &protocol, &shared)?;
-            match arguments.format {
-                PageFormat::Text => summary.to_text(),
-                PageFormat::Json => json_line(&summary)?,
-            }
+            let done = run::run(&arguments.out, &protocol, &shared)?;
+            let text = match arguments.format {
+                PageFormat::Text => done.summary.to_text(),
+                PageFormat::Json => json_line(&done.summary)?,
+            };
+            (text, page::of_run(done)?)
         } else {
-            let rows = study::run(&arguments.out, &study_runs, &shared)?;
-            match arguments.format {
+            let (rows, failed) = study::run(&arguments.out, &study_runs, &shared)?;
+            let text = match arguments.format {
                 PageFormat::Text => StudyRow::to_text(&rows),
                 PageFormat::Json => json_lines(rows.iter())?,
-            }
+            };
+            (text, page::of_study(camera, &rows, failed)?)
         };
         shared.progress.finish_and_clear();
+        if let Some(path) = &page_path {
+            let page = page::with_provenance(page, arguments.seed, indexed.catalog());
+            write_whole(&[super::page::file(path, &page)?])?;
+        }
         Ok(text)
     })?;
     Ok(Outcome::success(text))

@@ -1,13 +1,14 @@
 //! One run: simulates and processes the missing frames, and summarizes all of them.
 
 use super::figures;
+use super::frames::RunFrames;
 use super::parquet::Parts;
 use super::shared::Shared;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::output::files::{remove_outdated, write_into, write_whole};
 use crate::cli::output::rows::json_indented;
-use crate::cli::plot::FigureForm;
+use crate::cli::plot::{FigureForm, figure_files};
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
 use starpipe::study::validation::store::{
@@ -33,12 +34,19 @@ struct Timing {
     process_ms: f64,
 }
 
+/// A complete run.
+pub(super) struct Run {
+    pub(super) summary: Summary,
+    /// What a page shows of its frames.
+    pub(super) frames: RunFrames,
+}
+
 /// Completes the run in `directory` and summarizes it.
 pub(super) fn run(
     directory: &Path,
     protocol: &Protocol,
     shared: &Shared,
-) -> Result<Summary, CommandError> {
+) -> Result<Run, CommandError> {
     let validator = Validator::new(shared.indexed, protocol).map_err(|error| match error {
         ValidationError::Scenario(_) | ValidationError::NoLimit => {
             CommandError::Usage(error.to_string())
@@ -64,7 +72,11 @@ pub(super) fn run(
     parts.write_all(&tables)?;
     let summary = tables.summary(validator.facts(), validator.limit_vmag())?;
     save(directory, &summary, shared.figures)?;
-    Ok(summary)
+    let frames = match shared.pictures {
+        Some(most) => RunFrames::of(&tables, &validator, most)?,
+        None => RunFrames::default(),
+    };
+    Ok(Run { summary, frames })
 }
 
 /// A directory that holds something else is an error of the command line.
@@ -168,7 +180,7 @@ fn save(directory: &Path, summary: &Summary, form: FigureForm) -> anyhow::Result
     let texts = [json_indented(summary)?, summary.to_text()];
     let results = RESULTS.into_iter().zip(texts);
     let results = results.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figures::of_run(summary, form)?;
+    let figures = figure_files(figures::of_run(summary), form)?;
     write_into(directory, figures.into_iter().chain(results))?;
     Ok(())
 }

@@ -13,6 +13,8 @@ pub(super) struct Shared<'a> {
     /// Frames of each run.
     pub(super) frames: u64,
     pub(super) figures: FigureForm,
+    /// Small pictures of each run on the page, if there is to be one.
+    pub(super) pictures: Option<usize>,
     /// Progress over the frames of all runs.
     pub(super) progress: ProgressBar,
 }

@@ -1,11 +1,13 @@
 //! Studies: a run for each value of a parameter, and a row for each run.
 
+use super::frames::FailedFrames;
 use super::shared::Shared;
 use super::sweep::StudySweep;
 use super::{figures, run};
 use crate::cli::exit::CommandError;
 use crate::cli::output::files::write_into;
 use crate::cli::output::rows::{csv_table, json_indented};
+use crate::cli::plot::figure_files;
 use starpipe::model::sensitivity::Spacing;
 use starpipe::study::validation::{Protocol, StudyParameter, StudyRow};
 use std::path::Path;
@@ -49,24 +51,26 @@ pub(super) fn run(
     directory: &Path,
     runs: &[StudyRun],
     shared: &Shared,
-) -> Result<Vec<StudyRow>, CommandError> {
-    let mut rows = Vec::new();
+) -> Result<(Vec<StudyRow>, FailedFrames), CommandError> {
+    let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());
     for run in runs {
         let name = format!("{}={}", run.parameter.name(), run.value);
-        let summary = run::run(&directory.join(name), &run.protocol, shared)?;
+        let case = directory.join(&name);
+        let done = run::run(&case, &run.protocol, shared)?;
         rows.push(StudyRow::new(
             run.parameter,
             run.value,
             run.spacing,
-            &summary,
+            &done.summary,
         ));
+        failed.add(&name, done.frames);
     }
     let tables = [
         ("study.json", json_indented(&rows)?),
         ("study.csv", csv_table(rows.iter())?),
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figures::of_study(&rows, shared.figures)?;
+    let figures = figure_files(figures::of_study(&rows), shared.figures)?;
     write_into(directory, figures.into_iter().chain(tables))?;
-    Ok(rows)
+    Ok((rows, failed))
 }

@@ -1,5 +1,6 @@
 //! The hard suite: a run for each case, and a row for each run.
 
+use super::frames::FailedFrames;
 use super::run;
 use super::shared::Shared;
 use crate::cli::exit::CommandError;
@@ -13,14 +14,15 @@ pub(super) fn run(
     directory: &Path,
     base: &Protocol,
     shared: &Shared,
-) -> Result<Vec<HardRow>, CommandError> {
-    let mut rows = Vec::new();
+) -> Result<(Vec<HardRow>, FailedFrames), CommandError> {
+    let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());
     for case in &HARD_SUITE {
         let protocol = case.protocol(base);
         let check = protocol.setup.check();
         check.map_err(|error| CommandError::Usage(format!("{}: {error}", case.name)))?;
-        let summary = run::run(&directory.join(case.name), &protocol, shared)?;
-        rows.push(HardRow::new(case, &summary));
+        let done = run::run(&directory.join(case.name), &protocol, shared)?;
+        rows.push(HardRow::new(case, &done.summary));
+        failed.add(case.name, done.frames);
     }
     let tables = [
         ("suite.json", json_indented(&rows)?),
@@ -29,5 +31,5 @@ pub(super) fn run(
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
     write_into(directory, tables)?;
-    Ok(rows)
+    Ok((rows, failed))
 }

@@ -63,3 +63,5 @@ pub use scenario::{Reading, Scenario};
 pub use star_light::StarLight;
 #[doc(hidden)]
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
+#[doc(hidden)]
+pub use text::BudgetRow;

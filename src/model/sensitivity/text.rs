@@ -6,6 +6,7 @@ use super::prediction::{DetectorReport, Prediction};
 use super::rows::PredictionRow;
 use super::scenario::Reading;
 use crate::base::format::{five_digits, printable};
+use serde::Serialize;
 use std::fmt::Write as _;
 
 /// A quantity: symbol, description, value, unit.
@@ -48,13 +49,7 @@ impl PredictionRow {
             prediction.limit_vmag,
             five_digits(prediction.snr),
         );
-        for (title, lines) in [
-            ("camera", camera(prediction)),
-            ("conditions", conditions(prediction)),
-            ("on the way", on_the_way(&prediction.budget)),
-            ("noise of the brightest pixel", noise(&prediction.budget)),
-            ("the faintest star", faintest_star(&prediction.budget)),
-        ] {
+        for (title, lines) in budget_parts(prediction) {
             let _ = writeln!(text, "\n  {title}");
             for (symbol, description, value, unit) in lines {
                 let value = five_digits(value);
@@ -68,6 +63,49 @@ impl PredictionRow {
             .as_ref()
             .map_or_else(String::new, faintest_text)
     }
+}
+
+/// A quantity of the budget of a limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BudgetRow {
+    /// The part of the budget that it belongs to.
+    pub part: &'static str,
+    /// Its symbol in the paper, or empty.
+    pub symbol: &'static str,
+    /// What it is.
+    pub quantity: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Unit of the value.
+    pub unit: &'static str,
+}
+
+impl PredictionRow {
+    /// The budget of the limit, as the text has it.
+    pub fn budget_rows(&self) -> impl Iterator<Item = BudgetRow> {
+        let parts = budget_parts(&self.prediction).into_iter();
+        parts.flat_map(|(part, lines)| {
+            let row = move |(symbol, quantity, value, unit)| BudgetRow {
+                part,
+                symbol,
+                quantity,
+                value,
+                unit,
+            };
+            lines.into_iter().map(row)
+        })
+    }
+}
+
+/// The parts of a budget with their titles.
+fn budget_parts(prediction: &Prediction) -> [(&'static str, Vec<Line>); 5] {
+    [
+        ("camera", camera(prediction)),
+        ("conditions", conditions(prediction)),
+        ("on the way", on_the_way(&prediction.budget)),
+        ("noise of the brightest pixel", noise(&prediction.budget)),
+        ("the faintest star", faintest_star(&prediction.budget)),
+    ]
 }
 
 /// What is found of the stars, by both rules.

@@ -36,7 +36,9 @@ pub use letters::FONT;
 #[doc(hidden)]
 pub use svg::is_overlay as is_svg;
 
-use crate::pipeline::Solution;
+#[cfg(feature = "page")]
+use crate::frame::Frame;
+use crate::pipeline::{Background, Solution};
 use crate::sky::catalog::Catalog;
 use canvas::Canvas;
 use image::RgbImage;
@@ -44,6 +46,8 @@ use mark::MarkKind;
 use picture::Picture;
 use std::io;
 
+#[cfg(feature = "page")]
+pub(super) use encode::jpeg;
 pub use options::{LabelKind, OverlayFormat, OverlayOptions, Rings, SkyLayers, Stretch};
 pub use shown::Shown;
 
@@ -108,18 +112,20 @@ fn drawing(
     (canvas, picture)
 }
 
-/// A frame without marks, at the size of its overlay, as JPEG.
-///
-/// # Errors
-/// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
-#[cfg(feature = "page")]
-pub(super) fn photograph(
+/// A frame without marks, at the size of its overlay. [`Stretch::Hard`] needs the noise of its background.
+#[doc(hidden)]
+pub fn photograph(
     shown: &Shown<'_>,
-    solution: &Solution,
+    background: Option<&Background>,
     options: &OverlayOptions,
-) -> io::Result<Vec<u8>> {
-    let picture = Picture::of(shown, solution.background.as_ref(), options);
-    encode::jpeg(&picture.into_image())
+) -> RgbImage {
+    Picture::of(shown, background, options).into_image()
+}
+
+/// A frame without marks, reduced to at most `most_px` columns.
+#[cfg(feature = "page")]
+pub(super) fn thumbnail(frame: &Frame<'_>, most_px: usize) -> RgbImage {
+    Picture::reduced(frame, frame.width.div_ceil(most_px)).into_image()
 }
 
 #[cfg(test)]

@@ -57,16 +57,8 @@ impl Picture {
     ) -> Self {
         let frame = shown.frame;
         let (enlarged, reduced) = factors(frame, options.width_px);
-        let (width, height) = (
-            frame.width.div_ceil(reduced),
-            frame.height.div_ceil(reduced),
-        );
-        let size = Size::new(width, height);
-        let squares = Squares {
-            frame,
-            side: reduced,
-            size,
-        };
+        let squares = Squares::of(frame, reduced);
+        let Size { width, height } = squares.size;
         let small = match options.stretch {
             Stretch::None => photograph(&squares, shown.colors, None),
             Stretch::Soft => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
@@ -111,6 +103,18 @@ impl Picture {
         }
     }
 
+    /// `frame` in grey, with a dark sky brightened, each `side` × `side` pixels as one.
+    #[cfg(feature = "page")]
+    pub(super) fn reduced(frame: &Frame<'_>, side: usize) -> Self {
+        let squares = Squares::of(frame, side);
+        Self {
+            width: squares.size.width,
+            height: squares.size.height,
+            pixels: photograph(&squares, None, Some(SKY_LEVELS)),
+            scale: 1.0 / side as f32,
+        }
+    }
+
     /// The picture without marks.
     pub(super) fn into_image(self) -> RgbImage {
         let size = [self.width as u32, self.height as u32];
@@ -145,7 +149,13 @@ struct Squares<'a> {
     size: Size,
 }
 
-impl Squares<'_> {
+impl<'a> Squares<'a> {
+    /// Those of a frame.
+    fn of(frame: &'a Frame<'a>, side: usize) -> Self {
+        let size = Size::new(frame.width.div_ceil(side), frame.height.div_ceil(side));
+        Self { frame, side, size }
+    }
+
     /// Means over the squares of what `fill` writes for a row of pixels; NaN where there is no value.
     fn means(&self, mut fill: impl FnMut(usize, &mut [f32])) -> Vec<f32> {
         let Self { frame, side, size } = *self;

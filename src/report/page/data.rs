@@ -1,8 +1,8 @@
 //! What the scripts of a page draw.
 
-use super::FrameReport;
 use crate::base::format::to_decimals;
 use crate::pipeline::Solution;
+use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
 use serde::Serialize;
 

@@ -28,7 +28,8 @@ impl DefocusReport {
         text
     }
 
-    fn heading_text(&self) -> String {
+    /// What all spots have in common, how centroids are measured, the noise, and the lens.
+    pub fn heading_text(&self) -> String {
         let mut text = normalisation_text(self.stars.first().and_then(|star| star.peak));
         let centroid = match self.centroid {
             Centroiding::GaussianFit => "fit of a Gaussian spot",
@@ -48,22 +49,28 @@ impl DefocusReport {
         text
     }
 
-    /// The best radius, the required ones and that of the camera.
     fn radii_text(&self, star: &StarReport) -> String {
         let mut text = star.title();
-        let mut line = |name: &str, value: String| {
+        for (name, value) in self.radii_lines(star) {
             let _ = writeln!(text, "  {name:<26} {value}");
-        };
-        for required in &star.required {
-            let error_px = five_digits(required.required_error_px);
-            let name = format!("error of {error_px} px or less");
-            line(&name, self.required_text(star, required));
-        }
-        line("best", self.best_text(&star.best));
-        if let Some(present) = &star.present {
-            line("the camera as it is", self.radius_and_error_text(present));
         }
         text
+    }
+
+    /// The required radii, the best one and that of the camera, each with its name.
+    pub fn radii_lines(&self, star: &StarReport) -> Vec<(String, String)> {
+        let of_required = |required: &RequiredError| {
+            let error_px = five_digits(required.required_error_px);
+            let name = format!("error of {error_px} px or less");
+            (name, self.required_text(star, required))
+        };
+        let mut lines: Vec<_> = star.required.iter().map(of_required).collect();
+        lines.push(("best".to_owned(), self.best_text(&star.best)));
+        if let Some(present) = &star.present {
+            let value = self.radius_and_error_text(present);
+            lines.push(("the camera as it is".to_owned(), value));
+        }
+        lines
     }
 
     fn best_text(&self, best: &BestRadius) -> String {

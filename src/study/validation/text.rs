@@ -1,7 +1,7 @@
 //! Summary as text for people.
 
 use super::summary::{
-    AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, Quantiles, Summary,
+    AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, PullSummary, Quantiles, Summary,
 };
 use std::fmt::Write as _;
 
@@ -155,20 +155,7 @@ impl Summary {
             "0.27 %",
             "0.00 %"
         );
-        let p = &self.pulls;
-        let lines: [(&str, &Pull); 10] = [
-            ("star's x", &p.x),
-            ("star's y", &p.y),
-            ("star's light", &p.flux),
-            ("turn about x", &p.attitude_x),
-            ("turn about y", &p.attitude_y),
-            ("roll", &p.roll),
-            ("focal length", &p.focal_length),
-            ("zero point", &p.zero_point),
-            ("linearity", &p.linearity),
-            ("frame's limit", &p.frame_limit),
-        ];
-        for (name, pull) in lines {
+        for (name, pull) in self.pulls.named() {
             let _ = writeln!(
                 text,
                 "  {name:<14} {:>9} {:>9.3} {:>8.3} {:>7.2} % {:>7.2} % {:>7.2} %",
@@ -218,6 +205,24 @@ impl Summary {
             let _ = writeln!(text, "  {code:<28} {frames:>6}");
         }
         text
+    }
+}
+
+impl PullSummary {
+    /// All of them, with their names.
+    pub fn named(&self) -> [(&'static str, &Pull); 10] {
+        [
+            ("star's x", &self.x),
+            ("star's y", &self.y),
+            ("star's light", &self.flux),
+            ("turn about x", &self.attitude_x),
+            ("turn about y", &self.attitude_y),
+            ("roll", &self.roll),
+            ("focal length", &self.focal_length),
+            ("zero point", &self.zero_point),
+            ("linearity", &self.linearity),
+            ("frame's limit", &self.frame_limit),
+        ]
     }
 }
 

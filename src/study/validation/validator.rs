@@ -164,6 +164,14 @@ impl<'a> Validator<'a> {
         draw(self.protocol.seed, number)
     }
 
+    /// The frame with this number, to look at.
+    ///
+    /// # Errors
+    /// [`ValidationError::Simulate`].
+    pub fn frame(&self, number: u64) -> Result<Frame<'static>, ValidationError> {
+        Ok(self.simulate(number)?.frame)
+    }
+
     /// Simulates the frame with this number.
     pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, ValidationError> {
         let (seed, drawn) = self.draw(number);

@@ -145,6 +145,14 @@ impl RunTables {
         ))
     }
 
+    /// The rows of all frames.
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn frames(&self) -> Result<Rows<FrameRecord>, StoreError> {
+        self.frames.rows()
+    }
+
     /// Summarizes all rows. They are read from the files, so that the summary cannot depend on how
     /// often the run was interrupted.
     ///

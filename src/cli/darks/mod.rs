@@ -1,16 +1,20 @@
 //! `darks`: measures noise, pattern, dark current and hot pixels on frames taken without light.
 
+mod figure;
+mod page;
+
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::{FrameList, for_each_frame};
 use super::options::format::Format;
 use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
-use super::output::files::write_into;
+use super::output::files::{NewFile, make_directory, write_whole};
 use super::output::master::{fits_image, header};
 use super::output::messages::report_warning;
 use super::output::overwrite;
 use super::output::rows::{csv_table, finished, json_line};
+use super::page::HtmlOption;
 use clap::Args;
 use starpipe::base::size::Size;
 use starpipe::calibration::darks::{
@@ -25,7 +29,7 @@ use std::str::FromStr;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     starpipe darks darks/\n  \
-    starpipe darks --camera camera.toml --out calibration darks/\n  \
+    starpipe darks --camera camera.toml --out calibration --html darks/\n  \
     starpipe darks --exposure 0.1:short/ --exposure 10:long/ --format json short/ long/\n\n\
     --out writes master-dark.fits (for several exposures master-dark-0.1s.fits and so on), noise.fits and \
     hot-pixels.csv, for the options --dark and --hot-pixels of `starpipe process`. Exposures come from the files' \
@@ -55,6 +59,8 @@ pub(crate) struct DarksArgs {
     /// Also write the master dark, the noise of each pixel and the hot pixels into this directory
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    html: HtmlOption,
     #[command(flatten)]
     threads: ThreadOptions,
 }
@@ -86,6 +92,7 @@ impl FromStr for ExposureOf {
 pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
     let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
     check_exposures(&arguments.exposure, &frames)?;
+    let page_path = arguments.page_path(&frames)?;
     let config = arguments.config()?;
     let pool = arguments.threads.pool()?;
     let mut stack = DarkStack::new();
@@ -104,12 +111,15 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
     for warning in &darks.warnings {
         report_warning(warning);
     }
-    if let Some(directory) = &arguments.out {
-        let files = files(&darks)?;
-        let results: Vec<_> = files.iter().map(|(name, _)| directory.join(name)).collect();
-        overwrite::check_results(&frames, &results)?;
-        write_into(directory, files)?;
+    let mut results = match &arguments.out {
+        Some(directory) => results(directory, &darks, &frames)?,
+        None => Vec::new(),
+    };
+    if let Some(path) = &page_path {
+        let page = page::of(&darks, unread)?;
+        results.push(super::page::file(path, &page)?);
     }
+    write_whole(&results)?;
     Ok(Outcome {
         text: match arguments.format {
             Format::Text => darks.report().to_text(),
@@ -121,6 +131,15 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
 }
 
 impl DarksArgs {
+    /// The file of the page, if there is to be one.
+    fn page_path(&self, frames: &[PathBuf]) -> Result<Option<PathBuf>, CommandError> {
+        let camera = self.camera.iter().cloned();
+        let inputs: Vec<PathBuf> = frames.iter().cloned().chain(camera).collect();
+        let directory = self.out.clone().unwrap_or_default();
+        self.html
+            .checked_path(&inputs, || directory.join("darks.html"))
+    }
+
     fn config(&self) -> anyhow::Result<DarkConfig> {
         let sheet = self.camera.as_deref().map(DataSheet::read).transpose()?;
         let stated = self.bits.map(|bits| (bits, FullScaleSource::Option));
@@ -159,6 +178,22 @@ fn exposure_of(frame: &Path, exposures: &[ExposureOf]) -> Option<f64> {
     applies.max_by_key(depth).map(|of| of.exposure_s)
 }
 
+/// The files for `--out`, which overwrite nothing but such files.
+fn results(
+    directory: &Path,
+    darks: &Darks,
+    frames: &[PathBuf],
+) -> Result<Vec<NewFile>, CommandError> {
+    let files = files(darks)?.into_iter();
+    let results: Vec<NewFile> = files
+        .map(|(name, content)| (directory.join(name), content))
+        .collect();
+    let paths: Vec<_> = results.iter().map(|(path, _)| path.clone()).collect();
+    overwrite::check_results(frames, &paths)?;
+    make_directory(directory)?;
+    Ok(results)
+}
+
 /// Names and contents of the files for `--out`.
 fn files(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
@@ -177,7 +212,10 @@ fn files(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
         let image = fits_image(Size::new(darks.width, darks.height), noise, &header)?;
         files.push(("noise.fits".to_owned(), image));
     }
-    files.push(("hot-pixels.csv".to_owned(), hot_pixels_table(darks)?));
+    files.push((
+        "hot-pixels.csv".to_owned(),
+        hot_pixels_table(darks)?.into_bytes(),
+    ));
     Ok(files)
 }
 
@@ -199,7 +237,7 @@ fn master_dark(darks: &Darks, group: &ExposureGroup) -> anyhow::Result<Vec<u8>> 
 }
 
 /// The hot pixels as CSV, with a heading even if there are none.
-fn hot_pixels_table(darks: &Darks) -> anyhow::Result<Vec<u8>> {
+fn hot_pixels_table(darks: &Darks) -> anyhow::Result<String> {
     let mut writer = csv::WriterBuilder::new()
         .has_headers(false)
         .from_writer(Vec::new());
@@ -207,5 +245,5 @@ fn hot_pixels_table(darks: &Darks) -> anyhow::Result<Vec<u8>> {
     for hot in &darks.hot_pixels {
         writer.serialize(HotPixelRow::from(hot))?;
     }
-    Ok(finished(writer)?.into_bytes())
+    finished(writer)
 }

@@ -1,5 +1,3 @@
-"use strict";
-(() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const NS = "http://www.w3.org/2000/svg";
   const byId = (id) => document.getElementById(id);
@@ -158,96 +156,37 @@
   };
   let chosen = null;
   const choose = (star, center) => {
-    for (const node of chosen ? [chosen.shape, chosen.row] : []) node?.classList.remove("chosen");
+    for (const node of chosen ? [chosen.shape, table.rowOf(chosen)] : []) node.classList.remove("chosen");
     chosen = star;
-    star.shape.classList.add("chosen");
-    star.row?.classList.add("chosen");
+    const row = table.rowOf(star);
+    for (const node of [star.shape, row]) node.classList.add("chosen");
     if (center) {
       if (box.w > width / 4) zoom(box.w / (width / 4));
       move(star.x - box.x - box.w / 2, star.y - box.y - box.h / 2);
     } else {
-      star.row?.scrollIntoView({ block: "nearest" });
+      row.scrollIntoView({ block: "nearest" });
     }
     tell(star);
   };
 
-  // The table: its rows are made as far as they are seen.
-  const COLUMNS = [
-    ["name", "Name", (s) => s.name || "", true], ["id", "Catalogue", (s) => s.id || "", true],
-    ["v", "V", (s) => number(s.v, 2)], ["snr", "SNR", (s) => (s.snr ?? "")], ["flux", "Flux", (s) => (s.flux ?? "")],
-    ["x", "x", (s) => number(s.x, 2)], ["y", "y", (s) => number(s.y, 2)],
-    ["ra", "RA (°)", (s) => number(s.ra, 4)], ["dec", "Dec (°)", (s) => number(s.dec, 4)],
-    ["residual", "Residual (px)", (s) => number(s.residual, 3)], ["flags", "Flags", (s) => s.flags.join(" "), true],
-  ];
-  const STEP = 200;
-  const rows = byId("rows");
-  let order = stars.slice(), made = 0, sorted = { key: null, up: true };
-  const more = () => {
-    for (const star of order.slice(made, made + STEP)) {
-      if (!star.row) {
-        star.row = document.createElement("tr");
-        star.row.tabIndex = 0;
-        for (const [, , text, isText] of COLUMNS) {
-          const cell = star.row.insertCell();
-          cell.textContent = text(star);
-          if (isText) cell.className = "text";
-        }
-        star.row.addEventListener("click", () => choose(star, true));
-        star.row.addEventListener("keydown", (event) => { if (event.key === "Enter") choose(star, true); });
-      }
-      rows.appendChild(star.row);
-    }
-    made = Math.min(made + STEP, order.length);
-  };
-  const scroll = rows.closest(".scroll");
-  scroll.addEventListener("scroll", () => {
-    if (made < order.length && scroll.scrollTop + scroll.clientHeight > scroll.scrollHeight - 600) more();
+  // The table, with the marks in the picture of what is left in it.
+  const text = (key) => (s) => s[key] || "";
+  const column = (key, title, shown, isText = false) => ({ key, title, isText, text: shown, value: (s) => s[key] });
+  const table = makeTable(document.querySelector("section.table"), [
+    column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true),
+    column("v", "V", (s) => number(s.v, 2)), column("snr", "SNR", (s) => s.snr ?? ""), column("flux", "Flux", (s) => s.flux ?? ""),
+    column("x", "x", (s) => number(s.x, 2)), column("y", "y", (s) => number(s.y, 2)),
+    column("ra", "RA (°)", (s) => number(s.ra, 4)), column("dec", "Dec (°)", (s) => number(s.dec, 4)),
+    column("residual", "Residual (px)", (s) => number(s.residual, 3)),
+    { ...column("flags", "Flags", (s) => s.flags.join(" "), true), value: (s) => s.flags.join(" ") || undefined },
+  ], stars, {
+    choose: (star) => choose(star, true),
+    words: (star) => star.kind,
+    filtered: (order) => {
+      const fitting = new Set(order);
+      for (const star of stars) star.shape.style.display = fitting.has(star) ? "" : "none";
+    },
   });
-  const comparison = /^\s*(v|snr|flux|x|y|ra|dec|residual)\s*([<>])\s*(-?[\d.]+)\s*$/i;
-  const fill = () => {
-    const asked = byId("filter").value;
-    const compared = asked.match(comparison);
-    const word = asked.trim().toLowerCase();
-    const fits = compared
-      ? (star) => {
-          const value = star[compared[1].toLowerCase()];
-          return value !== undefined && (compared[2] === "<" ? value < Number(compared[3]) : value > Number(compared[3]));
-        }
-      : (star) => `${star.name || ""} ${star.id || ""} ${star.flags.join(" ")} ${star.kind}`.toLowerCase().includes(word);
-    order = stars.filter(fits);
-    const { key, up } = sorted;
-    if (key) {
-      const rank = (star) => (key === "flags" ? star.flags.join(" ") || undefined : star[key]);
-      order.sort((a, b) => {
-        const [p, q] = [rank(a), rank(b)];
-        if (p === undefined || q === undefined) return (p === undefined) - (q === undefined);
-        return (p < q ? -1 : p > q ? 1 : 0) * (up ? 1 : -1);
-      });
-    }
-    const fitting = new Set(order);
-    for (const star of stars) star.shape.style.display = fitting.has(star) ? "" : "none";
-    rows.replaceChildren();
-    made = 0;
-    more();
-    byId("count").textContent = `${order.length} of ${stars.length} detections`;
-  };
-  for (const [key, title, , isText] of COLUMNS) {
-    const head = document.createElement("th");
-    const button = document.createElement("button");
-    head.scope = "col";
-    if (isText) head.className = "text";
-    button.type = "button";
-    button.textContent = title;
-    button.addEventListener("click", () => {
-      sorted = { key, up: sorted.key === key ? !sorted.up : true };
-      for (const other of byId("head").children) other.removeAttribute("aria-sort");
-      head.setAttribute("aria-sort", sorted.up ? "ascending" : "descending");
-      fill();
-    });
-    head.appendChild(button);
-    byId("head").appendChild(head);
-  }
-  byId("filter").addEventListener("input", fill);
 
   // Figures.
   const ticks = (low, high, most) => {
@@ -324,7 +263,5 @@
     mark(data.predicted_vmag, "predicted", "predicted", 24);
   }
 
-  fill();
   show();
   new ResizeObserver(show).observe(view);
-})();

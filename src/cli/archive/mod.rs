@@ -1,9 +1,12 @@
 //! `archive`: how far an archive is, its tables in one file each, and what its nights were like.
 
+mod page;
+
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files::make_directory;
+use super::output::files::{make_directory, write_whole};
 use super::output::rows::{csv_table, json_line, json_lines};
+use super::page::HtmlOption;
 use clap::{Args, Subcommand};
 use starpipe::archive::{Archive, NightSummary, Status, merge, status, summary};
 use starpipe::base::format::{counted, printable};
@@ -30,7 +33,9 @@ enum ArchiveCommand {
     #[command(after_help = "Example:\n  starpipe archive merge results --out tables")]
     Merge(MergeArgs),
     /// Report the limiting magnitude of each night and camera, and the predicted one
-    #[command(after_help = "Example:\n  starpipe archive report results --format csv > nights.csv")]
+    #[command(after_help = "Examples:\n  \
+        starpipe archive report results --format csv > nights.csv\n  \
+        starpipe archive report results --html=night.html")]
     Report(ReportArgs),
 }
 
@@ -56,6 +61,8 @@ struct MergeArgs {
 struct ReportArgs {
     /// Directory that process --out-parquet has written
     directory: PathBuf,
+    #[command(flatten)]
+    html: HtmlOption,
     /// What to print
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -133,7 +140,14 @@ fn merge_tables(arguments: &MergeArgs) -> Result<Outcome, CommandError> {
 }
 
 fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
-    let nights = summary(&Archive::open(&arguments.directory)?)?;
+    let archive = Archive::open(&arguments.directory)?;
+    let default = || arguments.directory.join("report.html");
+    let page_path = arguments.html.checked_path(&[], default)?;
+    let nights = summary(&archive)?;
+    if let Some(path) = &page_path {
+        let page = page::of(&archive, &nights)?;
+        write_whole(&[super::page::file(path, &page)?])?;
+    }
     Ok(Outcome::success(match arguments.format {
         Format::Text => nights_text(&nights),
         Format::Json => json_lines(nights.iter())?,

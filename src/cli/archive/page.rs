@@ -1,0 +1,237 @@
+//! The page of an archive.
+
+use super::{NightLine, nights_text};
+use crate::cli::output::rows::csv_table;
+use crate::cli::page::{figure, options, table, thumbnails};
+use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
+use serde::Serialize;
+use serde_json::Value;
+use starpipe::archive::{Archive, FrameSummary, NightSummary, frames, status};
+use starpipe::base::format::counted;
+use starpipe::base::statistics::median;
+use starpipe::report::page::{Fact, Page, PageFigure};
+use std::collections::BTreeMap;
+
+/// Points of a figure; with more frames, each is the median of several.
+const MOST_POINTS: usize = 400;
+/// Longer runs have their dates in days, shorter ones in hours.
+const LONG_DAYS: f64 = 2.0;
+
+/// The page of the frames and nights of an archive.
+pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<Page> {
+    let mut frames = frames(archive)?;
+    let failed = |frame: &FrameSummary| !frame.is_identified();
+    let reasons = reasons(frames.iter().filter(|frame| failed(frame)));
+    let notes = notes(archive, &frames, &reasons)?;
+    let figures = limits(&frames)?;
+    let mut tables = Vec::new();
+    if !reasons.is_empty() {
+        let csv = csv_table(reasons.iter())?;
+        tables.push(table("Why frames are not identified", &csv)?);
+    }
+    // Failures first, otherwise by name.
+    frames.sort_by_key(|frame| frame.is_identified());
+    let pictures = frames.iter().filter(|frame| failed(frame));
+    let pictures = pictures.map(|frame| (frame.frame.clone(), frame.reason.clone()));
+    tables.push(table(
+        "Nights",
+        &csv_table(nights.iter().map(NightLine::of))?,
+    )?);
+    tables.push(table("Frames", &csv_table(frames.iter())?)?);
+    Ok(Page {
+        title: format!("Archive {}", archive.directory().display()),
+        question: format!("What do {} show?", counted(frames.len(), "frame")),
+        answer: answer(&frames),
+        facts: facts(&frames, nights),
+        notes,
+        text: nights_text(nights),
+        figures,
+        thumbnails_title: "Frames that are not identified".to_owned(),
+        thumbnails: thumbnails(pictures),
+        tables,
+        provenance: provenance(archive)?,
+    })
+}
+
+/// Frames that are not identified for one reason.
+#[derive(Serialize)]
+struct ReasonRow<'a> {
+    reason_code: &'a str,
+    frames: usize,
+    first_frame: &'a str,
+    /// Of the first frame.
+    reason: &'a str,
+}
+
+/// The reasons, the most frequent first.
+fn reasons<'a>(failed: impl Iterator<Item = &'a FrameSummary>) -> Vec<ReasonRow<'a>> {
+    let mut by_code: BTreeMap<&str, (usize, &FrameSummary)> = BTreeMap::new();
+    for frame in failed {
+        by_code.entry(&frame.reason_code).or_insert((0, frame)).0 += 1;
+    }
+    let row = |(code, (frames, first)): (&'a str, (usize, &'a FrameSummary))| ReasonRow {
+        reason_code: code,
+        frames,
+        first_frame: &first.frame,
+        reason: &first.reason,
+    };
+    let mut rows: Vec<_> = by_code.into_iter().map(row).collect();
+    rows.sort_by_key(|row| std::cmp::Reverse(row.frames));
+    rows
+}
+
+fn answer(frames: &[FrameSummary]) -> String {
+    let identified = frames.iter().filter(|frame| frame.is_identified()).count();
+    let unread = frames
+        .iter()
+        .filter(|frame| frame.status == "unread")
+        .count();
+    let all = frames.len();
+    let mut text = format!(
+        "{identified} of {} identified ({:.1} %)",
+        counted(all, "frame"),
+        100.0 * identified as f64 / all.max(1) as f64
+    );
+    let not_identified = all - identified - unread;
+    if not_identified > 0 {
+        text += &format!(", {not_identified} not identified");
+    }
+    if unread > 0 {
+        text += &format!(", {unread} could not be read");
+    }
+    text + "."
+}
+
+fn facts(frames: &[FrameSummary], nights: &[NightSummary]) -> Vec<Fact> {
+    let mut facts = Vec::new();
+    let mut add = |name: &str, unit: &str, value: fn(&FrameSummary) -> Option<f64>| {
+        let mut values: Vec<f64> = frames.iter().filter_map(value).collect();
+        if values.is_empty() {
+            return;
+        }
+        values.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+        let text = format!("{:.2}{unit} ({:.2} to {:.2})", at(0.5), at(0.05), at(0.95));
+        facts.push(Fact::new(name, text));
+    };
+    add("Half of the stars are found at V", "", |f| f.limit50_vmag);
+    add("Predicted", "", |f| f.predicted_limit50_vmag);
+    add("Measured minus predicted", " mag", |f| {
+        f.limit_difference_mag
+    });
+    add("Sky", " mag/arcsec²", |f| f.sky_mag_arcsec2);
+    add("Zero point", " mag", |f| f.zero_point_vmag);
+    add("Residuals", " px", |f| f.rms_px);
+    facts.push(Fact::new("Nights and cameras", nights.len().to_string()));
+    facts
+}
+
+fn notes(
+    archive: &Archive,
+    frames: &[FrameSummary],
+    reasons: &[ReasonRow<'_>],
+) -> anyhow::Result<Vec<String>> {
+    let status = status(archive)?;
+    let mut notes = Vec::new();
+    if !status.is_complete() {
+        notes.push(format!(
+            "{} of {} parts are missing: the same `starpipe process` continues.",
+            status.parts - status.parts_done,
+            status.parts
+        ));
+    }
+    for row in reasons {
+        let code = row.reason_code.replace('_', " ");
+        let (frames, reason) = (counted(row.frames, "frame"), row.reason);
+        notes.push(format!("{frames}: {code}. {}: {reason}", row.first_frame));
+    }
+    let mut coded: BTreeMap<&str, usize> = BTreeMap::new();
+    for code in frames.iter().flat_map(|frame| frame.notes.split(',')) {
+        *coded.entry(code).or_default() += 1;
+    }
+    coded.remove("");
+    if !coded.is_empty() {
+        let coded = coded
+            .iter()
+            .map(|(code, frames)| format!("{code} {frames}"));
+        let coded: Vec<_> = coded.collect();
+        notes.push(format!(
+            "Frames with a note, by its code: {}.",
+            coded.join(", ")
+        ));
+    }
+    Ok(notes)
+}
+
+/// The limits over time, if dates and limits are known.
+fn limits(frames: &[FrameSummary]) -> anyhow::Result<Vec<PageFigure>> {
+    let mut dated: Vec<(f64, &FrameSummary)> = frames
+        .iter()
+        .filter(|frame| frame.limit50_vmag.is_some())
+        .filter_map(|frame| Some((frame.t_min?, frame)))
+        .collect();
+    dated.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let ([(first, _), ..], Some((last, _))) = (&dated[..], dated.last()) else {
+        return Ok(Vec::new());
+    };
+    let (unit, scale) = if last - first > LONG_DAYS {
+        ("days", 1.0)
+    } else {
+        ("hours", 24.0)
+    };
+    let together = dated.len().div_ceil(MOST_POINTS);
+    let points = |value: fn(&FrameSummary) -> Option<f64>| -> Vec<(f64, f64)> {
+        let point = |chunk: &[(f64, &FrameSummary)]| {
+            let known = chunk
+                .iter()
+                .filter_map(|(date, frame)| Some((date, value(frame)?)));
+            let (mut times, mut values): (Vec<f64>, Vec<f64>) = known
+                .map(|(date, value)| (scale * (date - first), value))
+                .unzip();
+            (!values.is_empty()).then(|| (median(&mut times), median(&mut values)))
+        };
+        dated.chunks(together).filter_map(point).collect()
+    };
+    let mut layers = vec![Layer::new(
+        "measured",
+        BLUE,
+        Marks::Points(points(|frame| frame.limit50_vmag)),
+    )];
+    let predicted = points(|frame| frame.predicted_limit50_vmag);
+    if !predicted.is_empty() {
+        layers.push(Layer::new("predicted", ORANGE, Marks::Line(predicted)));
+    }
+    let panel = Panel {
+        title: "Half of the stars are found at".to_owned(),
+        x: Axis::of(format!("{unit} since the first frame")),
+        y: Axis::of("V"),
+        layers,
+    };
+    let caption = match together {
+        1 => "Limiting magnitude of each frame over time".to_owned(),
+        n => format!("Limiting magnitude over time; each point is the median of {n} frames"),
+    };
+    Ok(vec![figure(&Sheet::of_one(panel), &caption)?])
+}
+
+/// What the tables depend on.
+fn provenance(archive: &Archive) -> anyhow::Result<Vec<Fact>> {
+    let identity: Value = serde_json::from_str(archive.identity().text())?;
+    let text = |value: &Value| {
+        value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_owned)
+    };
+    let configuration = &identity["configuration"];
+    let settings = configuration.as_object().into_iter().flatten();
+    let settings = settings.filter(|(_, value)| !value.is_null() && !value.is_object());
+    let settings: Vec<String> = settings
+        .map(|(name, value)| format!("{name} {}", text(value)))
+        .collect();
+    Ok(vec![
+        options(),
+        Fact::new("Tables by starpipe", text(&identity["version"])),
+        Fact::new("Catalog", text(&configuration["catalog"]["title"])),
+        Fact::new("Options of the frames", settings.join(", ")),
+    ])
+}

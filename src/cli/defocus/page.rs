@@ -1,0 +1,101 @@
+//! The page of a study.
+
+use super::args::DefocusArgs;
+use super::{UNMET, curve_table, figures, plan};
+use crate::cli::page::{figure, options, table};
+use starpipe::base::format::five_digits;
+use starpipe::report::page::{Fact, Page, PageFigure};
+use starpipe::study::defocus::{DefocusReport, StarReport, StarStudy};
+
+/// The page of the results; `notes` are what was warned of.
+pub(super) fn of(
+    arguments: &DefocusArgs,
+    report: &DefocusReport,
+    studies: &[StarStudy],
+    mut notes: Vec<String>,
+) -> anyhow::Result<Page> {
+    let stars = &report.stars;
+    if !report.is_met() {
+        notes.insert(0, UNMET.to_owned());
+    }
+    if let (
+        [],
+        [
+            StarReport {
+                vmag: Some(v_mag), ..
+            },
+        ],
+    ) = (&arguments.vmag[..], &stars[..])
+    {
+        notes.push(plan::chosen_for_you(*v_mag));
+    }
+    if stars.iter().any(|star| star.best.is_at_edge) {
+        notes.push("The best radius is the first or the last that was tried: a better one may lie beyond. --radius-px tries others.".to_owned());
+    }
+    let heading = report.heading_text();
+    let assumed: Vec<&str> = heading.lines().collect();
+    if report.normalisation == "peak" {
+        notes.push(assumed[..2].join(" "));
+    }
+    let drawn: Vec<PageFigure> = figures::sheets(report, studies)
+        .iter()
+        .map(|(name, sheet)| figure(sheet, caption(name)))
+        .collect::<anyhow::Result<_>>()?;
+    Ok(Page {
+        title: "Radius of the spot for the best centroids".to_owned(),
+        question: format!(
+            "At which radius of the spot is the error of a centroid least? {} radii from {} to {} px.",
+            report.radii,
+            five_digits(report.radii_px[0]),
+            five_digits(report.radii_px[1])
+        ),
+        answer: stars.iter().map(answer).collect::<Vec<_>>().join(" "),
+        facts: stars.iter().flat_map(|star| facts(report, star)).collect(),
+        notes,
+        text: report.to_text(),
+        figures: drawn,
+        tables: vec![table("Errors over the radius", &curve_table(report)?)?],
+        provenance: vec![
+            options(),
+            Fact::new("Seed", report.seed.to_string()),
+            Fact::new("Assumed", assumed.join("; ")),
+        ],
+        ..Page::default()
+    })
+}
+
+fn name_of(star: &StarReport) -> String {
+    star.vmag
+        .map_or_else(String::new, |v_mag| format!("V {}: ", five_digits(v_mag)))
+}
+
+fn answer(star: &StarReport) -> String {
+    let [from, to] = star.best.nearly_px;
+    format!(
+        "{}{:.2} px, where the error is {:.4} px. From {from:.2} to {to:.2} px it is at most 5 % more.",
+        name_of(star),
+        star.best.radius.radius_px,
+        star.best.radius.error_px
+    )
+}
+
+fn facts(report: &DefocusReport, star: &StarReport) -> Vec<Fact> {
+    let lines = report.radii_lines(star).into_iter();
+    lines
+        .map(|(name, value)| Fact::new(format!("{}{name}", name_of(star)), value))
+        .collect()
+}
+
+fn caption(name: &str) -> &'static str {
+    match name {
+        "errors" => "Error of the centroid over noise and radius, with lines of equal error",
+        "sections" => "The same at a few noises and at a few radii",
+        "best-radius" => "The radius to choose, over the noise",
+        "accuracy-and-reach" => {
+            "What a radius costs: error of the centroid against limiting magnitude"
+        }
+        "spots" => "Spots of the paper's figure 1",
+        "surface" => "The surface through the errors (eq. 13), ours and the paper's",
+        _ => "The error if pixels are sampled at their centres",
+    }
+}

@@ -1,0 +1,157 @@
+//! The page of a prediction, or of sweeps.
+
+use super::args::LimitArgs;
+use super::{changes_nothing, figures};
+use crate::cli::output::rows::csv_table;
+use crate::cli::page::{catalog, figure, options, table};
+use starpipe::base::format::five_digits;
+use starpipe::model::sensitivity::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
+use starpipe::report::page::{Fact, Page};
+use starpipe::sky::catalog::Catalog;
+
+const PAPER: &str =
+    "The equations are used as the paper's authors did. --reading physical corrects the physics.";
+/// What a prediction alone is swept over in the figures of its page.
+const SWEPT: [&str; 2] = ["exposure_s", "aperture_mm"];
+/// Its values go from this part to this multiple of the scenario's.
+const SWEPT_BY: f64 = 4.0;
+const SWEPT_VALUES: usize = 31;
+
+/// The page of the predictions `rows`.
+pub(super) fn of(
+    rows: &[PredictionRow],
+    arguments: &LimitArgs,
+    scenario: &Scenario,
+) -> anyhow::Result<Page> {
+    let camera = &scenario.camera.name;
+    let of_scenario = PredictionRow::new(scenario, arguments.scenario.preset, Catalog::built_in());
+    let mut page = Page {
+        title: format!("Limiting magnitude of {camera}"),
+        question: question(scenario),
+        text: PredictionRow::to_text(rows),
+        provenance: vec![
+            options(),
+            catalog(Catalog::built_in()),
+            Fact::new("Camera", camera.clone()),
+            Fact::new("Equations", scenario.reading.words()),
+        ],
+        ..Page::default()
+    };
+    if scenario.reading == Reading::Paper {
+        page.notes.push(PAPER.to_owned());
+    }
+    let own = match &of_scenario {
+        Ok(row) => {
+            page.answer = answer(row);
+            page.facts = facts(row);
+            Some(row)
+        }
+        // The values of a sweep may have limits that the camera as it is does not have.
+        Err(error) => {
+            page.answer = format!("Without the sweep there is no limit: {error}");
+            None
+        }
+    };
+    let given: Vec<Sweep> = arguments
+        .sweep
+        .iter()
+        .map(|sweep| sweep.0.clone())
+        .collect();
+    let drawn = if given.is_empty() {
+        default_sweeps(scenario)
+    } else {
+        page.notes.extend(notes(rows));
+        given.clone()
+    };
+    for sweep in &drawn {
+        let Ok(sheet) = figures::of_sweeps([sweep].into_iter(), scenario) else {
+            continue;
+        };
+        let caption = format!(
+            "The limit over {}; the dot is the camera as it is",
+            sweep.parameter.title()
+        );
+        page.figures.push(figure(&sheet, &caption)?);
+    }
+    if !given.is_empty() {
+        let csv = csv_table(rows.iter().map(PredictionRow::table_row))?;
+        page.tables.push(table("Predictions", &csv)?);
+    }
+    if let Some(row) = own {
+        let csv = csv_table(row.budget_rows())?;
+        page.tables.push(table("Budget of the limit", &csv)?);
+    }
+    Ok(page)
+}
+
+fn question(scenario: &Scenario) -> String {
+    format!(
+        "Which is the faintest star that {} detects, with an exposure of {} s and an aperture of {} mm?",
+        scenario.camera.name,
+        five_digits(scenario.conditions.exposure_s),
+        five_digits(scenario.camera.aperture_mm)
+    )
+}
+
+fn answer(row: &PredictionRow) -> String {
+    let prediction = &row.prediction;
+    let limit = format!(
+        "V {:.2}: the brightest pixel of such a star has {} times the noise.",
+        prediction.limit_vmag,
+        five_digits(prediction.snr)
+    );
+    match prediction.detector.limit50_vmag {
+        Some(found) => {
+            format!("{limit} starpipe's filter finds half of the stars of V {found:.2}.")
+        }
+        None => limit + " starpipe's filter has no limit: it finds noise as often.",
+    }
+}
+
+fn facts(row: &PredictionRow) -> Vec<Fact> {
+    let prediction = &row.prediction;
+    let e = |value: f64| format!("{} e", five_digits(value));
+    let mut facts = vec![Fact::new(
+        "Limit",
+        format!("V {:.2}", prediction.limit_vmag),
+    )];
+    for (name, limit) in [
+        ("Half are found at", prediction.detector.limit50_vmag),
+        ("Nine in ten are found at", prediction.detector.limit90_vmag),
+    ] {
+        facts.extend(limit.map(|v| Fact::new(name, format!("V {v:.2}"))));
+    }
+    if let Some(faintest) = &row.faintest {
+        let value = format!("V {:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
+        facts.push(Fact::new("Faintest star to be expected in a field", value));
+        let found = five_digits((faintest.stars_found * 10.0).round() / 10.0);
+        facts.push(Fact::new("Stars found in a field", found));
+    }
+    facts.extend([
+        Fact::new("Light of the star", e(prediction.star_e)),
+        Fact::new("Sky in a pixel", e(prediction.background_e)),
+        Fact::new("Noise", e(prediction.noise_e)),
+        Fact::new("Airmass", five_digits(prediction.airmass)),
+    ]);
+    facts
+}
+
+/// Parameters that change nothing.
+fn notes(rows: &[PredictionRow]) -> Vec<String> {
+    let parameter = |row: &PredictionRow| row.swept.map(|swept| swept.parameter);
+    let sweeps = rows.chunk_by(|a, b| parameter(a) == parameter(b));
+    let idle = sweeps.filter(|rows| PredictionRow::have_same_limits(rows));
+    idle.filter_map(|rows| parameter(&rows[0]))
+        .map(changes_nothing)
+        .collect()
+}
+
+fn default_sweeps(scenario: &Scenario) -> Vec<Sweep> {
+    let sweep = |name: &&str| {
+        let parameter = Parameter::named(name).ok()?;
+        let value = parameter.get(scenario)?;
+        let ends = [value / SWEPT_BY, value * SWEPT_BY];
+        Sweep::new(name, ends, SWEPT_VALUES, Spacing::Log).ok()
+    };
+    SWEPT.iter().filter_map(sweep).collect()
+}

@@ -1,0 +1,336 @@
+//! The pages of a run, of a study and of a suite.
+
+use super::figures;
+use super::frames::{FailedFrames, FrameRow, MOST_ROWS};
+use super::run::Run;
+use crate::cli::output::rows::csv_table;
+use crate::cli::page::{catalog, figure, options, table};
+use serde::Serialize;
+use starpipe::base::format::{counted, five_digits};
+use starpipe::report::page::{Fact, Page, PageTable};
+use starpipe::sky::catalog::Catalog;
+use starpipe::study::validation::{HardRow, Pull, StudyRow, Summary};
+use std::collections::BTreeMap;
+
+const FAILED: &str = "Frames that failed";
+/// A mean is off if it differs from what is true by more than so many standard errors.
+const OFF_SIGMA: f64 = 3.0;
+/// Mean of the squared error of three angles in units of its covariance, where that is true.
+const NEES: f64 = 3.0;
+
+/// The page of a run.
+pub(super) fn of_run(run: Run) -> anyhow::Result<Page> {
+    let Run { summary, frames } = run;
+    let mut page = Page {
+        title: format!("Validation of {}", summary.facts.camera),
+        question: format!(
+            "How often is a frame of {} identified, and are the stated errors true? {} at random attitudes, scale {}.",
+            summary.facts.camera,
+            counted(summary.frames, "simulated frame"),
+            if summary.facts.scale_known {
+                "known"
+            } else {
+                "unknown"
+            }
+        ),
+        answer: answer(&summary),
+        facts: facts(&summary),
+        notes: notes(&summary, &frames.rows),
+        text: summary.to_text(),
+        thumbnails_title: FAILED.to_owned(),
+        thumbnails: frames.pictures,
+        tables: tables(&summary, &frames.rows)?,
+        ..Page::default()
+    };
+    for (name, sheet) in figures::of_run(&summary) {
+        page.figures.push(figure(&sheet, caption(name))?);
+    }
+    Ok(page)
+}
+
+/// The page of a suite.
+pub(super) fn of_suite(
+    camera: &str,
+    rows: &[HardRow],
+    failed: FailedFrames,
+) -> anyhow::Result<Page> {
+    let [frames, right, wrong] = [
+        rows.iter().map(|row| row.frames).sum(),
+        rows.iter().map(|row| row.right).sum(),
+        rows.iter().map(|row| row.wrong).sum(),
+    ];
+    let nees = rows.iter().filter_map(|row| {
+        let off = nees_note(row.nees_mean?, row.nees_sigma?)?;
+        Some(format!("{}: {off}", row.case))
+    });
+    let mut page = Page {
+        title: format!("Hard cases for {camera}"),
+        question: format!(
+            "How often is a frame identified where lens, spot or detector are not what the pipeline assumes? {}.",
+            counted(rows.len(), "case")
+        ),
+        answer: rates([frames, right, wrong]),
+        notes: worst(
+            rows.iter()
+                .map(|row| (row.case, [row.frames, row.right, row.wrong])),
+        )
+        .into_iter()
+        .chain(nees)
+        .collect(),
+        text: HardRow::to_text(rows),
+        tables: vec![table("Cases", &csv_table(rows.iter())?)?],
+        ..Page::default()
+    };
+    add_failed(&mut page, failed)?;
+    Ok(page)
+}
+
+/// The page of a study.
+pub(super) fn of_study(
+    camera: &str,
+    rows: &[StudyRow],
+    failed: FailedFrames,
+) -> anyhow::Result<Page> {
+    let [frames, right, wrong] = [
+        rows.iter().map(|row| row.frames).sum(),
+        rows.iter().map(|row| row.right).sum(),
+        rows.iter().map(|row| row.wrong).sum(),
+    ];
+    let name = |row: &StudyRow| format!("{} {}", row.parameter, five_digits(row.value));
+    let counts = rows
+        .iter()
+        .map(|row| (name(row), [row.frames, row.right, row.wrong]));
+    let nees = rows.iter().filter_map(|row| {
+        let off = nees_note(row.nees_mean?, row.nees_sigma?)?;
+        Some(format!("{}: {off}", name(row)))
+    });
+    let mut page = Page {
+        title: format!("Study of {camera}"),
+        question: format!(
+            "How do identification, limit and errors depend on a parameter? {}.",
+            counted(rows.len(), "value")
+        ),
+        answer: rates([frames, right, wrong]),
+        notes: worst(counts).into_iter().chain(nees).collect(),
+        text: StudyRow::to_text(rows),
+        tables: vec![table("Values", &csv_table(rows.iter())?)?],
+        ..Page::default()
+    };
+    for (name, sheet) in figures::of_study(rows) {
+        let caption = format!("Identification, limit and errors over {name}");
+        page.figures.push(figure(&sheet, &caption)?);
+    }
+    add_failed(&mut page, failed)?;
+    Ok(page)
+}
+
+/// The page with where it is from.
+pub(super) fn with_provenance(page: Page, seed: u64, of_stars: &Catalog) -> Page {
+    let provenance = vec![
+        options(),
+        Fact::new("Seed", seed.to_string()),
+        catalog(of_stars),
+    ];
+    Page { provenance, ..page }
+}
+
+fn add_failed(page: &mut Page, failed: FailedFrames) -> anyhow::Result<()> {
+    if !failed.rows.is_empty() {
+        page.tables
+            .push(table(FAILED, &csv_table(failed.rows.iter())?)?);
+    }
+    page.notes.extend(cut_note(failed.rows.len()));
+    page.thumbnails_title = FAILED.to_owned();
+    page.thumbnails = failed.pictures;
+    Ok(())
+}
+
+fn cut_note(rows: usize) -> Option<String> {
+    (rows == MOST_ROWS)
+        .then(|| format!("The table of frames has {MOST_ROWS} rows at most; frames.csv has all."))
+}
+
+/// Counts of all frames, of right and of wrong ones as a sentence.
+fn rates([frames, right, wrong]: [usize; 3]) -> String {
+    format!(
+        "{right} of {} identified rightly ({:.2} %), {wrong} wrongly, {} not.",
+        counted(frames, "frame"),
+        100.0 * right as f64 / frames.max(1) as f64,
+        frames - right - wrong
+    )
+}
+
+/// Notes on runs with wrong answers, and on the one with the fewest right ones.
+fn worst<N: std::fmt::Display>(runs: impl Iterator<Item = (N, [usize; 3])>) -> Vec<String> {
+    let mut notes = Vec::new();
+    let mut least: Option<(f64, String)> = None;
+    for (name, counts) in runs {
+        let [frames, right, wrong] = counts;
+        let share = right as f64 / frames.max(1) as f64;
+        let said = format!("{name}: {}", rates(counts));
+        if wrong > 0 {
+            notes.push(said);
+        } else if share < 1.0 && least.as_ref().is_none_or(|(found, _)| share < *found) {
+            least = Some((share, said));
+        }
+    }
+    notes.extend(least.map(|(_, said)| format!("Fewest without a wrong answer: {said}")));
+    notes
+}
+
+fn answer(summary: &Summary) -> String {
+    let all = &summary.identification.all;
+    format!(
+        "{} 95 % interval of right answers: {:.2} to {:.2} %; of wrong ones: below {:.2} %.",
+        rates([all.frames, all.right, all.wrong]),
+        all.right_low_percent,
+        all.right_high_percent,
+        all.wrong_high_percent + 0.005
+    )
+}
+
+fn facts(summary: &Summary) -> Vec<Fact> {
+    let completeness = &summary.completeness;
+    let mut facts = vec![Fact::new(
+        "Half of the stars should be found at",
+        format!("V {:.3}", completeness.predicted_limit_vmag),
+    )];
+    if let (Some(limit), Some(sigma), Some(difference)) = (
+        completeness.measured_limit_vmag,
+        completeness.measured_limit_sigma_mag,
+        completeness.difference_mag,
+    ) {
+        let value = format!("V {limit:.3} ± {sigma:.3}: {difference:+.3} mag from the prediction");
+        facts.push(Fact::new("Half are found at", value));
+    }
+    if let Some(attitude) = &summary.attitude {
+        let nees = format!("{:.3} ± {:.3}", attitude.nees_mean, attitude.nees_sigma);
+        facts.push(Fact::new("NEES, where errors are true 3", nees));
+        for (name, of) in [
+            ("Boresight off by", &attitude.boresight_arcsec),
+            ("Roll off by", &attitude.roll_arcsec),
+        ] {
+            let value = format!("{:.2}″ (half), {:.2}″ (95 %)", of.p50, of.p95);
+            facts.push(Fact::new(name, value));
+        }
+    }
+    let pulls = summary.pulls.named().into_iter();
+    let pulls: Vec<String> = pulls
+        .filter(|(_, pull)| pull.count > 0)
+        .map(|(name, pull)| format!("{name} {:+.2}, {:.2}", pull.mean, pull.sd))
+        .collect();
+    facts.push(Fact::new(
+        "Pulls, where errors are true 0, 1 (mean, standard deviation)",
+        pulls.join("; "),
+    ));
+    let detection = &summary.detection;
+    facts.push(Fact::new(
+        "False detections per million pixels",
+        format!(
+            "{} ({} to {})",
+            detection.false_per_mpx, detection.false_low_per_mpx, detection.false_high_per_mpx
+        ),
+    ));
+    facts.push(Fact::new(
+        "Wrong names",
+        format!("{} of {}", detection.misnamed, detection.named),
+    ));
+    facts
+}
+
+/// That stated errors of the attitude are too small or too large, if they are.
+fn nees_note(mean: f64, sigma: f64) -> Option<String> {
+    let too = if mean > NEES { "small" } else { "large" };
+    let is_off = (mean - NEES).abs() > OFF_SIGMA * sigma;
+    is_off.then(|| {
+        format!("the stated errors of the attitude are too {too}: NEES {mean:.2} ± {sigma:.2}, where they are true 3.")
+    })
+}
+
+fn notes(summary: &Summary, rows: &[FrameRow]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let wrong = summary.identification.all.wrong;
+    if wrong > 0 {
+        notes.push(format!("{} identified wrongly.", counted(wrong, "frame")));
+    }
+    let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
+    for reason in rows.iter().filter_map(|row| row.reason.as_deref()) {
+        *reasons.entry(reason).or_default() += 1;
+    }
+    for (reason, frames) in reasons {
+        let reason = reason.replace('_', " ");
+        notes.push(format!(
+            "{} not identified: {reason}.",
+            counted(frames, "frame")
+        ));
+    }
+    let attitude = summary.attitude.as_ref();
+    notes.extend(attitude.and_then(|a| nees_note(a.nees_mean, a.nees_sigma)));
+    let codes = summary.notes.iter();
+    let codes: Vec<String> = codes
+        .map(|(code, frames)| format!("{code} {frames}"))
+        .collect();
+    if !codes.is_empty() {
+        notes.push(format!(
+            "Frames with a note, by its code: {}.",
+            codes.join(", ")
+        ));
+    }
+    notes.extend(cut_note(rows.len()));
+    notes
+}
+
+/// A pull as a row.
+#[derive(Serialize)]
+struct PullRow {
+    pull: &'static str,
+    values: usize,
+    mean: f64,
+    sd: f64,
+    beyond_2_percent: f64,
+    beyond_3_percent: f64,
+    beyond_5_percent: f64,
+}
+
+impl PullRow {
+    fn of((name, pull): (&'static str, &Pull)) -> Self {
+        Self {
+            pull: name,
+            values: pull.count,
+            mean: pull.mean,
+            sd: pull.sd,
+            beyond_2_percent: pull.beyond_2_percent,
+            beyond_3_percent: pull.beyond_3_percent,
+            beyond_5_percent: pull.beyond_5_percent,
+        }
+    }
+}
+
+fn tables(summary: &Summary, frames: &[FrameRow]) -> anyhow::Result<Vec<PageTable>> {
+    let pulls = summary.pulls.named().into_iter().map(PullRow::of);
+    let by_stars = summary.identification.by_stars.iter();
+    [
+        ("Frames, failures first", csv_table(frames.iter())?),
+        ("Identification by number of stars", csv_table(by_stars)?),
+        ("Completeness", csv_table(summary.completeness.bins.iter())?),
+        (
+            "Errors of centroids",
+            csv_table(summary.centroids.bins.iter())?,
+        ),
+        ("Pulls", csv_table(pulls)?),
+    ]
+    .iter()
+    .map(|(title, csv)| table(title, csv))
+    .collect()
+}
+
+fn caption(name: &str) -> &'static str {
+    match name {
+        "identification" => "How often frames are identified, by the stars that are bright enough",
+        "completeness" => "Share of the stars that is found, and the prediction",
+        "centroids" => "Errors of centroids, and the bound that no estimate can beat",
+        "pulls" => "Errors over their stated standard errors, and the curve where these are true",
+        "faintest" => "The faintest named star against the faintest to be expected",
+        _ => "Errors of the attitude",
+    }
+}

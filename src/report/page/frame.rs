@@ -1,0 +1,87 @@
+//! The page of a frame.
+//!
+//! `frame.js` draws the detections over the picture, and the figures: magnitude against flux, residuals,
+//! completeness with the predicted limit.
+
+use super::data::PageData;
+use super::template::{Kind, picture_address, render};
+use crate::pipeline::Solution;
+use crate::report::overlay::{OverlayOptions, Shown, photograph};
+use crate::report::{FrameReport, TextOptions};
+use minijinja::context;
+use minijinja::value::{Serde, Value};
+use std::io;
+
+const FRAME: Kind = Kind {
+    template: "frame.html",
+    script: include_str!("frame.js"),
+};
+
+/// The page of a frame; without `shown`, as for a list of centroids, without its picture.
+///
+/// # Errors
+/// If the picture cannot be encoded, which does not occur for frames within the limits of their size.
+pub fn html(
+    report: &FrameReport,
+    solution: &Solution,
+    shown: Option<&Shown<'_>>,
+    options: &OverlayOptions,
+) -> io::Result<String> {
+    let background = solution.background.as_ref();
+    let picture = shown.map(|shown| picture_address(&photograph(shown, background, options)));
+    let notes: Vec<String> = report.notes.iter().map(|note| note.text.clone()).collect();
+    let values = context! {
+        report => Value::from(Serde(report)),
+        title => shown.map_or(report.frame.as_str(), |shown| shown.title),
+        notes,
+        text => report.to_text(TextOptions::default()),
+        picture => picture.transpose()?,
+    };
+    render(&FRAME, values, &PageData::of(report, solution))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::SearchFailure;
+    use crate::pipeline::{Outcome, Reason};
+    use crate::report::page::is_page;
+    use crate::report::{frame_report::StarReport, sample};
+    use crate::sky::catalog::Catalog;
+
+    /// A frame with one detection that is not identified.
+    fn frame() -> (Solution, FrameReport) {
+        let reason = Reason::Search(SearchFailure::TooFewStars {
+            found: 1,
+            needed: 4,
+        });
+        let solution = sample::solution(400, 300, Outcome::NotIdentified(reason));
+        let mut report = FrameReport::new("a.tif", &solution, Catalog::built_in());
+        report.stars.push(StarReport::default());
+        (solution, report)
+    }
+
+    #[test]
+    fn names_are_text_and_neither_tags_nor_the_end_of_a_script() {
+        let (solution, mut report) = frame();
+        report.frame = "<script>alert(1)</script>.tif".to_owned();
+        report.stars[0].name = Some("</script><b>".to_owned());
+        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        assert!(!page.contains("<script>alert") && !page.contains("</script><b>"));
+        assert!(page.contains("&lt;script&gt;alert(1)&lt;&#x2f;script&gt;.tif"));
+        assert_eq!(page.matches("</script>").count(), 2);
+        assert!(is_page(page.as_bytes()));
+    }
+
+    #[test]
+    fn a_page_needs_no_other_file() {
+        let (solution, report) = frame();
+        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        for reference in ["src=\"", "http:", "https:", "url(", "@import"] {
+            let found = page
+                .replace("http://www.w3.org/2000/svg", "")
+                .contains(reference);
+            assert!(!found, "{reference}");
+        }
+    }
+}

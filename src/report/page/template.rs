@@ -1,0 +1,63 @@
+//! The templates, and what all pages are made with.
+
+use crate::report::overlay::jpeg;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use image::RgbImage;
+use minijinja::value::Value;
+use minijinja::{Environment, context};
+use serde::Serialize;
+use std::io;
+
+/// A page of one kind.
+pub(super) struct Kind {
+    /// Its template.
+    pub(super) template: &'static str,
+    /// What its script does, beside tables.
+    pub(super) script: &'static str,
+}
+
+const TEMPLATES: [(&str, &str); 4] = [
+    ("base.html", include_str!("base.html")),
+    ("table.html", include_str!("table.html")),
+    ("frame.html", include_str!("frame.html")),
+    ("document.html", include_str!("document.html")),
+];
+
+/// The page of `kind` with `values` in its template and `data` for its script.
+pub(super) fn render(kind: &Kind, values: Value, data: &impl Serialize) -> io::Result<String> {
+    let mut environment = Environment::new();
+    for (name, source) in TEMPLATES {
+        environment
+            .add_template(name, source)
+            .map_err(io::Error::other)?;
+    }
+    let script = [
+        "\"use strict\";\n(() => {\n",
+        include_str!("table.js"),
+        kind.script,
+        "})();\n",
+    ];
+    let values = context! {
+        data => script_data(data)?,
+        style => include_str!("page.css"),
+        script => script.concat(),
+        version => env!("CARGO_PKG_VERSION"),
+        ..values
+    };
+    environment
+        .get_template(kind.template)
+        .and_then(|template| template.render(values))
+        .map_err(io::Error::other)
+}
+
+/// JSON that may stand in a script: a name cannot end it.
+fn script_data(data: &impl Serialize) -> io::Result<String> {
+    Ok(serde_json::to_string(data)?.replace('<', "\\u003c"))
+}
+
+/// A picture as the address that holds it.
+pub(super) fn picture_address(picture: &RgbImage) -> io::Result<String> {
+    let bytes = jpeg(picture)?;
+    Ok(format!("data:image/jpeg;base64,{}", BASE64.encode(bytes)))
+}
