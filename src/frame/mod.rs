@@ -67,6 +67,7 @@ pub use directory::{
     CALIBRATION_CREATOR, COPY_CREATOR, files_in, is_calibration_frame, is_copy, is_overlay,
 };
 pub use error::FrameError;
+pub(crate) use fits::write_rows;
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
 pub use image::Frame;

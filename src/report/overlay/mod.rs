@@ -29,7 +29,7 @@ mod shown;
 pub use canvas::FONT;
 
 use crate::frame::OVERLAY_TEXT;
-use crate::pipeline::Solution;
+use crate::pipeline::{Background, Solution};
 use crate::sky::catalog::Catalog;
 use canvas::Canvas;
 use image::RgbImage;
@@ -85,14 +85,14 @@ pub fn draw(
     canvas.into_image()
 }
 
-/// A frame without marks, at the size of its overlay.
-#[cfg(feature = "page")]
-pub(super) fn photograph(
+/// A frame without marks, at the size of its overlay. [`Stretch::Hard`] needs the noise of its background.
+#[doc(hidden)]
+pub fn photograph(
     shown: &Shown<'_>,
-    solution: &Solution,
+    background: Option<&Background>,
     options: &OverlayOptions,
 ) -> RgbImage {
-    Picture::of(shown, solution.background.as_ref(), options.stretch).into_image()
+    Picture::of(shown, background, options.stretch).into_image()
 }
 
 /// Encodes the picture, fast rather than small.

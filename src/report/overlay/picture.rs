@@ -7,7 +7,6 @@ use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::{Colors, Frame, luminance};
 use crate::pipeline::Background;
-#[cfg(feature = "page")]
 use image::RgbImage;
 
 /// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
@@ -75,7 +74,6 @@ impl Picture {
     }
 
     /// The picture without marks.
-    #[cfg(feature = "page")]
     pub(super) fn into_image(self) -> RgbImage {
         let size = [self.width as u32, self.height as u32];
         RgbImage::from_raw(size[0], size[1], self.pixels.into_flattened())

@@ -69,7 +69,7 @@ pub fn is_page(head: &[u8]) -> bool {
 /// The frame without marks, as JPEG.
 fn jpeg(shown: &Shown<'_>, solution: &Solution, options: &OverlayOptions) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let picture = photograph(shown, solution, options);
+    let picture = photograph(shown, solution.background.as_ref(), options);
     let encoder = JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
     picture
         .write_with_encoder(encoder)
