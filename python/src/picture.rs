@@ -10,14 +10,13 @@ use starpipe::base::files;
 use starpipe::report::overlay::{OverlayOptions, Shown, photograph};
 use std::path::PathBuf;
 
-/// A frame as the program's overlays show it, without marks: red, green and blue. Small frames are
-/// enlarged and large ones reduced by whole factors. Its rows are those of the file as stored. Also
-/// returns rows and columns of the frame.
+/// Red, green and blue of each pixel, and rows and columns of the frame.
+type Picture<'py> = (Bound<'py, PyArray3<u8>>, (usize, usize));
+
+/// A frame as the program's overlays show it, without marks. Small frames are
+/// enlarged and large ones reduced by whole factors. Its rows are those of the file as stored.
 #[pyfunction]
-pub fn picture<'py>(
-    py: Python<'py>,
-    frame: Input<'_>,
-) -> PyResult<(Bound<'py, PyArray3<u8>>, (usize, usize))> {
+pub fn picture<'py>(py: Python<'py>, frame: Input<'_>) -> PyResult<Picture<'py>> {
     let input = frame.borrow()?;
     let (image, shape) = on_this_thread(py, |interrupt| {
         let (frame, colors) = input.shown(&mut buffers(interrupt))?;
