@@ -101,7 +101,8 @@ class Pipeline:
         Returns
         -------
         Result
-            False in a condition where the stars are not identified.
+            False in a condition where the stars are not identified. It keeps the pixels that were
+            passed, for `Result.plot`; those of a file are read again.
 
         Raises
         ------
@@ -207,8 +208,9 @@ class Pipeline:
         Yields
         ------
         Result
-            As of `solve`. An image that cannot be read does not end the others: its result is
-            false, and has in `error` what `solve` raises for it.
+            As of `solve`, but without the pixels of images that are no files. An image that cannot
+            be read does not end the others: its result is false, and has in `error` what `solve`
+            raises for it.
 
         Raises
         ------
