@@ -42,6 +42,16 @@ pub enum Source<'a> {
 }
 
 impl Image<'_> {
+    /// Where the colors of its pixels are.
+    pub fn colors(&self) -> PyResult<ColorSource<'_>> {
+        Ok(match self {
+            Self::Bytes(bytes) => ColorSource::Bytes(bytes),
+            Self::Path(path) => ColorSource::Path(path),
+            Self::Colors(colors) => colors.levels()?,
+            _ => ColorSource::None,
+        })
+    }
+
     /// Borrows the pixels of an array.
     pub fn source(&self) -> PyResult<Source<'_>> {
         let frame = match self {
@@ -62,6 +72,52 @@ impl Image<'_> {
     }
 }
 
+/// Where the colors of a frame are.
+pub enum ColorSource<'a> {
+    None,
+    Path(&'a Path),
+    Bytes(&'a [u8]),
+    /// Whole numbers, of so many channels.
+    Integers(&'a [i64], usize),
+    F32(&'a [f32], usize),
+}
+
+impl ColorSource<'_> {
+    /// The colors of `frame`, which was read from there.
+    pub fn of(&self, frame: &Frame, buffers: &mut Buffers) -> Option<frame::Colors> {
+        let pixels = match *self {
+            Self::None => return None,
+            Self::Path(path) => return frame::Colors::read(path, frame, buffers),
+            Self::Bytes(bytes) => return frame::Colors::decode(bytes, frame, buffers),
+            Self::Integers(levels, channels) => {
+                let highest = levels.iter().copied().max().unwrap_or(0);
+                // Levels of up to 16 bits keep their steps.
+                let scale = match highest {
+                    ..=0xff => 257.0,
+                    0x100..=0xffff => 1.0,
+                    _ => f32::from(u16::MAX) / highest as f32,
+                };
+                scaled(levels, channels, |level| level as f32 * scale)
+            }
+            Self::F32(levels, channels) => {
+                let finite = levels.iter().copied().filter(|level| level.is_finite());
+                let highest = finite.fold(f32::MIN_POSITIVE, f32::max);
+                let scale = f32::from(u16::MAX) / highest;
+                scaled(levels, channels, |level| level * scale)
+            }
+        };
+        frame::Colors::new(frame, pixels)
+    }
+}
+
+/// Red, green and blue of each pixel, where 65535 is full scale.
+fn scaled<T: Copy>(levels: &[T], channels: usize, scale: impl Fn(T) -> f32) -> Vec<[u16; 3]> {
+    let pixels = levels.chunks_exact(channels);
+    // Conversion from floats saturates.
+    let pixel = |levels: &[T]| [0, 1, 2].map(|channel| scale(levels[channel]).round() as u16);
+    pixels.map(pixel).collect()
+}
+
 impl Colors<'_> {
     fn luminance(&self) -> PyResult<Result<Frame<'static>, FrameError>> {
         let shape = match self {
@@ -70,7 +126,6 @@ impl Colors<'_> {
         };
         let size = Size::new(shape[1], shape[0]);
         let channels = shape[2];
-        let contiguous = |_| PyTypeError::new_err("the array must be C-contiguous");
         Ok(match self {
             Self::Integers(array, full_scale) => {
                 let samples = array.as_slice().map_err(contiguous)?;
@@ -79,6 +134,20 @@ impl Colors<'_> {
             Self::F32(array) => {
                 let samples = array.as_slice().map_err(contiguous)?.to_vec();
                 Frame::from_float_colors(size, channels, samples)
+            }
+        })
+    }
+
+    /// The levels of all channels, pixel after pixel.
+    fn levels(&self) -> PyResult<ColorSource<'_>> {
+        Ok(match self {
+            Self::Integers(array, _) => {
+                let samples = array.as_slice().map_err(contiguous)?;
+                ColorSource::Integers(samples, array.shape()[2])
+            }
+            Self::F32(array) => {
+                let samples = array.as_slice().map_err(contiguous)?;
+                ColorSource::F32(samples, array.shape()[2])
             }
         })
     }
@@ -98,8 +167,11 @@ pub fn bad_pixels<'a>(
 }
 
 fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [T]> {
-    let contiguous = array.as_slice();
-    contiguous.map_err(|_| PyTypeError::new_err("the array must be C-contiguous"))
+    array.as_slice().map_err(contiguous)
+}
+
+fn contiguous(_: numpy::AsSliceError) -> PyErr {
+    PyTypeError::new_err("the array must be C-contiguous")
 }
 
 fn sides<T: numpy::Element>(array: &PyReadonlyArray2<'_, T>) -> [usize; 2] {

@@ -9,15 +9,19 @@ mod catalogs;
 mod darks;
 mod detect;
 mod errors;
+mod flats;
 mod image;
+mod input;
 mod interrupt;
 mod lens;
 mod options;
 mod pages;
+mod picture;
 mod pipeline;
 mod simulate;
 mod solved;
 mod studies;
+mod track;
 
 use pyo3::prelude::*;
 
@@ -33,11 +37,15 @@ mod _starpipe {
     #[pymodule_export]
     use super::detect::detect;
     #[pymodule_export]
+    use super::flats::{FlatFrames, Flats};
+    #[pymodule_export]
     use super::image::check_size;
     #[pymodule_export]
     use super::lens::calibrate;
     #[pymodule_export]
     use super::pages::{Page, Pages, read_page};
+    #[pymodule_export]
+    use super::picture::{picture, write_file};
     #[pymodule_export]
     use super::pipeline::Pipeline;
     #[pymodule_export]
@@ -46,6 +54,8 @@ mod _starpipe {
     use super::solved::Solved;
     #[pymodule_export]
     use super::studies::{defocus, limit, robustness, validate};
+    #[pymodule_export]
+    use super::track::Tracker;
     use pyo3::prelude::*;
 
     /// Panics become exceptions, and print nothing.

@@ -28,7 +28,7 @@ pub fn read_page(
 }
 
 /// Buffers for a frame that ends with `interrupt`.
-fn buffers(interrupt: &Interrupt) -> Buffers {
+pub fn buffers(interrupt: &Interrupt) -> Buffers {
     let mut buffers = Buffers::new();
     buffers.set_interrupt(interrupt.clone());
     buffers

@@ -3,13 +3,12 @@
 use crate::camera::description;
 use crate::catalogs;
 use crate::errors::exception;
-use crate::image::{Image, Source, bad_pixels};
+use crate::input::{Borrowed, Failed, Input};
 use crate::interrupt::{on_this_thread, on_threads, useful};
 use crate::options::Options;
 use crate::solved::Solved;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
-use starpipe::calibration::Master;
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
@@ -17,9 +16,7 @@ use starpipe::photometry::instrumental_mag;
 use starpipe::pipeline::{
     self, CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_guarded, solve_read,
 };
-use starpipe::{
-    Calibration, Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace,
-};
+use starpipe::{Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -53,38 +50,31 @@ impl Pipeline {
         })
     }
 
-    /// Solves an image; `name` stands for the name of its file. Pixels are those of its rows as stored,
-    /// or of the picture as drawn.
-    #[pyo3(signature = (image, name, mask, options, dark, flat, threads, as_drawn))]
+    /// Level without light of the stated camera, in grey levels.
+    #[getter]
+    fn bias_adu(&self) -> f64 {
+        let camera = self.camera.as_ref();
+        let sheet = camera.and_then(|camera| camera.sheet.as_ref());
+        sheet.map_or(0.0, |sheet| sheet.bias_adu)
+    }
+
+    /// Solves a frame. Pixels are those of its rows as stored, or of the picture as drawn.
     fn solve(
         &self,
         py: Python<'_>,
-        image: Image<'_>,
-        name: Option<PathBuf>,
-        mask: Option<PyReadonlyArray2<'_, bool>>,
+        frame: Input<'_>,
         options: Options,
-        dark: Option<Image<'_>>,
-        flat: Option<Image<'_>>,
         threads: NonZeroUsize,
         as_drawn: bool,
     ) -> PyResult<Solved> {
-        let source = image.source()?;
-        let bad = bad_pixels(mask.as_ref())?;
-        let dark = dark.as_ref().map(Image::source).transpose()?;
-        let flat = flat.as_ref().map(Image::source).transpose()?;
+        let input = frame.borrow()?;
         let mut context = self.context(&options)?;
         context.as_stored = !as_drawn;
         let work = |interrupt: &Interrupt| {
-            let name = name.unwrap_or_else(|| source.name());
+            let name = input.name.clone();
             let mut workspace = self.workspace(threads, interrupt);
             let solved = solve_guarded(&name, &mut workspace, |workspace| {
-                let input = Input {
-                    source,
-                    bad,
-                    dark,
-                    flat,
-                };
-                self.solve_input(&name, input, context, workspace)
+                solve_input(input, context, workspace)
             });
             self.keep(workspace);
             let (solution, row_order) = solved.map_err(|Failed(error)| error)?;
@@ -144,79 +134,9 @@ impl Pipeline {
 }
 
 impl Pipeline {
-    fn context(&self, options: &Options) -> PyResult<Context<'static>> {
+    pub fn context(&self, options: &Options) -> PyResult<Context<'static>> {
         let context = Context::new(self.indexed);
         Ok(context.with_options(&options.resolve()?, self.camera.clone()))
-    }
-
-    /// Solves an input; returns the order of its rows, too, if it is a file.
-    fn solve_input(
-        &self,
-        name: &Path,
-        input: Input,
-        context: Context,
-        workspace: &mut Workspace,
-    ) -> Result<(Solution, Option<RowOrder>), Failed> {
-        let Input { source, bad, .. } = input;
-        let is_file = source.is_file();
-        if input.dark.is_none() && input.flat.is_none() {
-            if !is_file {
-                let frame = source.frame(name, bad, &mut workspace.frames)?;
-                let solution = solve_frame(&frame, &context, workspace);
-                return Ok((solution.map_err(detect_error(name))?, None));
-            }
-            let mut row_order = None;
-            let read = |buffers: &mut Buffers| {
-                let frame = source.frame(name, bad, buffers)?;
-                row_order = Some(frame.metadata.row_order);
-                Ok(frame.into_owned())
-            };
-            let (solution, frame) = solve_read(name, read, &context, workspace)?;
-            workspace.frames.recycle(frame);
-            return Ok((solution, row_order));
-        }
-        workspace.begin(&context);
-        let frame = source.frame(name, bad, &mut workspace.frames)?.into_owned();
-        let row_order = is_file.then_some(frame.metadata.row_order);
-        let calibration =
-            self.calibration(input.dark, input.flat, row_order, &mut workspace.frames);
-        let calibration = calibration.map_err(Failed)?;
-        let mut context = context;
-        context.calibration = Some(&calibration);
-        let (solution, _) = solve_read(name, |_| Ok(frame), &context, workspace)?;
-        Ok((solution, row_order))
-    }
-
-    /// The calibration of a frame as drawn, whose file has its rows in this order. The masters of an
-    /// array, and arrays as masters, apply row by row.
-    fn calibration(
-        &self,
-        dark: Option<Source>,
-        flat: Option<Source>,
-        row_order: Option<RowOrder>,
-        buffers: &mut Buffers,
-    ) -> PyResult<Calibration> {
-        let mut master = |source: Source| {
-            let (name, is_file) = (source.name(), source.is_file());
-            let frame = source.frame(&name, None, buffers);
-            let mut frame = frame.map_err(exception)?.into_owned();
-            if !is_file {
-                frame.metadata.row_order = row_order.unwrap_or_default();
-            }
-            if !is_file || row_order.is_none() {
-                frame = frame.as_stored();
-            }
-            let name = name.display().to_string();
-            Ok::<_, PyErr>(Master { name, frame })
-        };
-        let dark = dark.map(&mut master).transpose()?;
-        let flat = flat.map(&mut master).transpose()?;
-        let sheet = self
-            .camera
-            .as_ref()
-            .and_then(|camera| camera.sheet.as_ref());
-        let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
-        Calibration::new(dark, flat, None, bias_adu).map_err(exception)
     }
 
     /// Buffers of an earlier frame where there are any.
@@ -245,21 +165,47 @@ impl Pipeline {
     }
 }
 
-/// An image, and what is to be done with it.
-struct Input<'a> {
-    source: Source<'a>,
-    bad: Option<&'a [bool]>,
-    dark: Option<Source<'a>>,
-    flat: Option<Source<'a>>,
-}
-
-/// Why there is no solution.
-struct Failed(PyErr);
-
-impl<E: Into<pipeline::Error>> From<E> for Failed {
-    fn from(error: E) -> Self {
-        Self(exception(error.into()))
+/// Solves an input; returns the order of its rows, too, if it is a file.
+fn solve_input(
+    input: Borrowed,
+    context: Context,
+    workspace: &mut Workspace,
+) -> Result<(Solution, Option<RowOrder>), Failed> {
+    let Borrowed {
+        name,
+        source,
+        bad,
+        masters,
+        ..
+    } = input;
+    let is_file = source.is_file();
+    if masters.is_empty() {
+        if !is_file {
+            let frame = source.frame(&name, bad, &mut workspace.frames)?;
+            let solution = solve_frame(&frame, &context, workspace);
+            return Ok((solution.map_err(detect_error(&name))?, None));
+        }
+        let mut row_order = None;
+        let read = |buffers: &mut Buffers| {
+            let frame = source.frame(&name, bad, buffers)?;
+            row_order = Some(frame.metadata.row_order);
+            Ok(frame.into_owned())
+        };
+        let (solution, frame) = solve_read(&name, read, &context, workspace)?;
+        workspace.frames.recycle(frame);
+        return Ok((solution, row_order));
     }
+    workspace.begin(&context);
+    let frame = source
+        .frame(&name, bad, &mut workspace.frames)?
+        .into_owned();
+    let row_order = is_file.then_some(frame.metadata.row_order);
+    let calibration = masters.calibration(row_order, &mut workspace.frames);
+    let calibration = calibration.map_err(Failed)?;
+    let mut context = context;
+    context.calibration = calibration.as_ref();
+    let (solution, _) = solve_read(&name, |_| Ok(frame), &context, workspace)?;
+    Ok((solution, row_order))
 }
 
 fn detect_error(name: &Path) -> impl FnOnce(DetectError) -> pipeline::Error {

@@ -10,26 +10,36 @@ from importlib.metadata import version as _version
 
 from ._darks import Darks, darks
 from ._detect import Detections, detect
+from ._flats import Flats, flats
 from ._lens import LensCalibration, calibrate
+from ._measured import Distortion, Limit, Match
 from ._options import SolveOptions
 from ._pipeline import Pipeline
 from ._result import Result
 from ._simulate import Simulation, simulate
 from ._studies import Validation, defocus, limit, robustness, validate
+from ._track import Track, Tracker
 
 __all__ = [
     "Darks",
     "Detections",
+    "Distortion",
+    "Flats",
     "LensCalibration",
+    "Limit",
+    "Match",
     "Pipeline",
     "Result",
     "Simulation",
     "SolveOptions",
+    "Track",
+    "Tracker",
     "Validation",
     "calibrate",
     "darks",
     "defocus",
     "detect",
+    "flats",
     "limit",
     "robustness",
     "simulate",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from . import _starpipe, _tables
 from ._hints import header_exposure, positive, whole_number
 from ._images import Image, ImageLike
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+    from astropy.units import Quantity
 
 
 class Darks:
@@ -45,7 +49,7 @@ class Darks:
         return None if noise is None else noise.reshape(self._darks.shape)
 
     @property
-    def hot_pixels(self) -> Any:
+    def hot_pixels(self) -> QTable:
         """The hot pixels as a ``QTable`` or a dict of arrays."""
         return _tables.table(_tables.columns(json.loads(self._darks.hot_pixels())), {})
 
@@ -61,9 +65,9 @@ class Darks:
 def darks(
     images: Iterable[ImageLike],
     *,
-    exposure: Any = None,
+    exposure: Quantity | float | Sequence[Quantity | float | None] | None = None,
     bits: int | None = None,
-    gain: Any = None,
+    gain: Quantity | float | None = None,
 ) -> Darks:
     """Measure noise, pattern, dark current and hot pixels on frames taken without light.
 
@@ -88,8 +92,9 @@ def darks(
         If frames have different sizes, or an argument is out of range.
     """
     images = list(images)
-    each = isinstance(exposure, (list, tuple, np.ndarray)) and np.ndim(exposure) == 1
-    exposures = list(exposure) if each else [exposure] * len(images)
+    exposures: list[Any] = [exposure] * len(images)
+    if isinstance(exposure, (list, tuple, np.ndarray)) and np.ndim(exposure) == 1:
+        exposures = list(exposure)
     if len(exposures) != len(images):
         raise ValueError(f"{len(exposures)} exposures are given for {len(images)} frames")
     frames = _starpipe.DarkFrames()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from . import _starpipe, _tables
 from ._hints import positive, thread_count, whole_number
 from ._images import Image, ImageLike, mask_of
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
 
 
 class Detections:
@@ -58,7 +61,7 @@ class Detections:
         return {name: column for name, column in found.items() if name not in of_sky}
 
     @property
-    def stars(self) -> Any:
+    def stars(self) -> QTable:
         """The stars as a ``QTable``; without astropy `columns`."""
         return _tables.star_table(self.columns)
 

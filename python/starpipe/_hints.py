@@ -66,6 +66,24 @@ def whole_number(value: Any, name: str, least: int) -> int:
     return found
 
 
+def pixel_angle(scale: Any) -> float | None:
+    """Return the angle of a pixel in arcseconds: an angle, or an angle per pixel."""
+    unit = getattr(scale, "unit", None)
+    if unit is not None and unit.is_equivalent("deg / pix"):
+        scale = scale.to_value("arcsec / pix")
+    return positive(scale, "arcsec", "pixel_scale")
+
+
+def seconds(time: Any, name: str) -> float | None:
+    """Return a time in seconds, from any origin."""
+    if hasattr(time, "unix_tai"):
+        time = time.unix_tai
+    elif hasattr(time, "to_value") and not hasattr(time, "unit"):
+        # Differences of times.
+        time = time.to_value("s")
+    return number(time, "s", name)
+
+
 def thread_count(threads: Any) -> int:
     """Return how many threads to start: more than 8 only where there are more processors."""
     return min(whole_number(threads, "threads", 1), max(8, os.cpu_count() or 1))

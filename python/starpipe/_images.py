@@ -5,14 +5,35 @@ from __future__ import annotations
 import io
 import os
 import warnings
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import IO, TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _starpipe
+from ._camera import PathLike
 
-ImageLike: TypeAlias = Any
+if TYPE_CHECKING:
+    from astropy.io.fits import HDUList, ImageHDU, PrimaryHDU
+    from astropy.nddata import NDData
+    from PIL.Image import Image as PILImage
+
+    ImageLike: TypeAlias = (
+        PathLike
+        | bytes
+        | bytearray
+        | memoryview
+        | IO[bytes]
+        | ArrayLike
+        | PILImage
+        | HDUList
+        | PrimaryHDU
+        | ImageHDU
+        | NDData
+    )
+else:
+    ImageLike = Any
 """What an image may be passed as.
 
 - A path, the bytes of a file, or a file that is open for reading in binary mode.
@@ -29,6 +50,25 @@ KINDS = (
     "a path, bytes, a file open for reading in binary mode, an array, an image of PIL, "
     "an HDU, an HDUList, CCDData or NDData"
 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Input:
+    """A frame as the compiled part takes it, with what is to be done to it."""
+
+    image: _starpipe._Image
+    name: PathLike | None = None
+    mask: NDArray[np.bool_] | None = None
+    dark: _starpipe._Image | None = None
+    flat: _starpipe._Image | None = None
+    bias_adu: float = 0.0
+
+    @property
+    def is_of_files(self) -> bool:
+        """Whether all of it is in files, which can be read again."""
+        parts = (self.image, self.dark, self.flat)
+        are_files = all(part is None or isinstance(part, (str, os.PathLike)) for part in parts)
+        return are_files and self.mask is None
 
 
 class Image:
@@ -78,6 +118,24 @@ class Image:
                 self.mask = _mask(np.asarray(mask.any(axis=2)) if mask.ndim == 3 else mask, name)
             image = image.data
         self.pixels = _pixels(image, name)
+
+    def input(
+        self,
+        name: PathLike | None,
+        mask: ArrayLike | None,
+        dark: ImageLike | None,
+        flat: ImageLike | None,
+        bias_adu: float,
+    ) -> Input:
+        """Return the image with what is to be done to it; `name` stands for that of its file."""
+        return Input(
+            self.pixels,
+            self.file_name if name is None else str(name),
+            mask_of(self, mask),
+            None if dark is None else Image(dark, "dark").pixels,
+            None if flat is None else Image(flat, "flat").pixels,
+            bias_adu,
+        )
 
     @property
     def shape(self) -> tuple[int, ...] | None:

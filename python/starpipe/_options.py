@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, TypeVar
 
 from ._hints import (
     NAME_ODDS,
@@ -14,6 +14,7 @@ from ._hints import (
     header_date,
     header_exposure,
     iso_date,
+    pixel_angle,
     positive,
     velocity_km_s,
     whole_number,
@@ -22,9 +23,15 @@ from ._hints import (
 from ._hints import site as geodetic
 
 if TYPE_CHECKING:
-    from astropy.coordinates import Angle, EarthLocation, SkyCoord
+    import datetime
+
+    import numpy as np
+    from astropy.coordinates import Angle, CartesianRepresentation, EarthLocation, SkyCoord
     from astropy.time import Time
     from astropy.units import Quantity
+    from numpy.typing import ArrayLike
+
+    DateLike: TypeAlias = Time | datetime.datetime | datetime.date | np.datetime64 | str
 
 
 class SolveOptions(TypedDict, total=False):
@@ -33,7 +40,8 @@ class SolveOptions(TypedDict, total=False):
     Parameters
     ----------
     fov, pixel_scale : Quantity or float
-        Horizontal field of view (degrees), or the angle of a pixel (arcseconds).
+        Horizontal field of view (degrees), or the angle of a pixel (arcseconds, or arcseconds per
+        pixel).
     scale_error : Quantity or float
         How far `fov` or `pixel_scale` may be off, in percent; 10 by default.
     near : SkyCoord or (ra, dec)
@@ -83,10 +91,10 @@ class SolveOptions(TypedDict, total=False):
     scale_error: Quantity | float
     near: SkyCoord | tuple[float, float] | None
     radius: Angle | Quantity | float
-    date: Time | str | Any | None
+    date: DateLike | None
     site: EarthLocation | tuple[float, ...] | None
     air: tuple[Quantity | float, Quantity | float] | None
-    velocity: Any | None
+    velocity: CartesianRepresentation | Quantity | ArrayLike | None
     frame_of: Literal["icrs", "apparent"]
     exposure: Quantity | float | None
     zenith_distance: Angle | Quantity | float | None
@@ -136,7 +144,7 @@ def solve_options(
     exposure = header_exposure(header) if exposure is None else exposure
     return {
         "fov_deg": positive(fov, "deg", "fov", 360.0),
-        "pixel_scale_arcsec": positive(pixel_scale, "arcsec", "pixel_scale"),
+        "pixel_scale_arcsec": pixel_angle(pixel_scale),
         "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
         "near_deg": direction(near),
         "radius_deg": positive(radius, "deg", "radius", 180.000001),

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from . import _starpipe
 from ._camera import PathLike
 from ._hints import thread_count, whole_number
-from ._images import Image, ImageLike, mask_of
+from ._images import Image, ImageLike, Input
 from ._options import SolveOptions, solve_options, takes_options
 from ._result import Result
 
@@ -101,7 +101,8 @@ class Pipeline:
         Returns
         -------
         Result
-            False in a condition where the stars are not identified.
+            False in a condition where the stars are not identified. It keeps the pixels that were
+            passed, for `Result.plot`; those of a file are read again.
 
         Raises
         ------
@@ -117,18 +118,10 @@ class Pipeline:
             If starpipe has a bug.
         """
         taken = Image(image)
-        name = taken.file_name if name is None else str(name)
-        solved = self._pipeline.solve(
-            taken.pixels,
-            name,
-            mask_of(taken, mask),
-            solve_options(taken.header, **options),
-            None if dark is None else Image(dark, "dark").pixels,
-            None if flat is None else Image(flat, "flat").pixels,
-            thread_count(threads),
-            False,
-        )
-        return _in_time(solved)
+        frame = taken.input(name, mask, dark, flat, self._pipeline.bias_adu)
+        stated = solve_options(taken.header, **options)
+        solved = self._pipeline.solve(frame, stated, thread_count(threads), False)
+        return _in_time(solved, frame)
 
     @takes_options
     def identify(
@@ -193,7 +186,7 @@ class Pipeline:
         solved = self._pipeline.identify(
             table, (rows, width), brightness, error is not None, solve_options(**options)
         )
-        return _in_time(solved)
+        return _in_time(solved, None)
 
     def solve_many(
         self, images: Iterable[ImageLike], *, threads: int = 1, **known: Any
@@ -215,8 +208,9 @@ class Pipeline:
         Yields
         ------
         Result
-            As of `solve`. An image that cannot be read does not end the others: its result is
-            false, and has in `error` what `solve` raises for it.
+            As of `solve`, but without the pixels of images that are no files. An image that cannot
+            be read does not end the others: its result is false, and has in `error` what `solve`
+            raises for it.
 
         Raises
         ------
@@ -247,16 +241,16 @@ class Pipeline:
     def _result(self, image: ImageLike, known: dict[str, Any]) -> Result:
         """Return the result of an image; what is wrong with it alone is part of the result."""
         try:
-            return self.solve(image, **known)
+            return self.solve(image, **known)._keeping_paths()
         except (OSError, ValueError, RuntimeError) as error:
             is_path = isinstance(image, (str, os.PathLike))
-            name = os.fspath(image) if is_path else type(image).__name__
-            return Result._unread(str(name), error)
+            name = str(image) if is_path else type(image).__name__
+            return Result._unread(name, error)
 
 
-def _in_time(solved: _starpipe.Solved) -> Result:
+def _in_time(solved: _starpipe.Solved, frame: Input | None) -> Result:
     """Return the result, unless there was no answer within the time limit."""
     reason = solved.timeout
     if reason is not None:
         raise TimeoutError(reason)
-    return Result._of(solved)
+    return Result._of(solved, frame)

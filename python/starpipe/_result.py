@@ -4,21 +4,37 @@ from __future__ import annotations
 
 import html
 import json
+import os
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _starpipe, _tables
+from . import _plot, _starpipe, _tables
+from ._attitude import ARCSEC_PER_RAD, Attitude, quantity
+from ._camera import PathLike
+from ._images import Image, ImageLike, Input
+from ._measured import Distortion, Limit, Match
+
+if TYPE_CHECKING:
+    from astropy.coordinates import SkyCoord
+    from astropy.io.fits import Header
+    from astropy.table import QTable
+    from astropy.units import Quantity
+    from astropy.wcs import WCS
+    from matplotlib.axes import Axes
+    from pyarrow import Table
 
 
-class Result:
+class Result(Attitude):
     """What was found in a frame. In a condition it is true where the stars are identified.
 
     Pixels are those of the array, or of the array that ``astropy.io.fits.getdata`` reads from the
     file: (0, 0) is the centre of the first pixel of its first row, x runs along a row, y counts
     rows. Everything else agrees with that: `wcs`, `quaternion`, whether the frame is mirrored.
+
+    What is not known is None: of a frame that is not identified, all that follows from its stars.
 
     Attributes
     ----------
@@ -27,19 +43,26 @@ class Result:
     """
 
     error: Exception | None = None
+    _input: Input | None = None
 
     def __init__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
 
     @classmethod
-    def _of(cls, solved: _starpipe.Solved) -> Result:
-        return cls({"_solved": solved})
+    def _of(cls, solved: _starpipe.Solved, frame: Input | None) -> Result:
+        return cls({"_solved": solved, "_input": frame})
+
+    def _keeping_paths(self) -> Result:
+        """Return the result without the pixels of its frame; what is in files is read again."""
+        if self._input is not None and not self._input.is_of_files:
+            self._input = None
+        return self
 
     @classmethod
     def _unread(cls, name: str, error: Exception) -> Result:
         """Return what stands for a frame without an answer."""
-        nothing = ("attitude", "optics", "match", "photometry", "prediction", "width", "height")
-        report: dict[str, Any] = dict.fromkeys(nothing)
+        nothing = ("attitude", "optics", "match", "magnitude", "photometry", "prediction")
+        report: dict[str, Any] = dict.fromkeys((*nothing, "width", "height"))
         report |= {"frame": name, "notes": [], "remedies": [], "stars": [], "timing_ms": {}}
         report |= {"status": "unread", "reason": str(error), "reason_code": "unread"}
         none = dict.fromkeys(("_wcs_header", "_row_order", "attitude_covariance"))
@@ -52,6 +75,7 @@ class Result:
             "_wcs_header": self._wcs_header,
             "_row_order": self._row_order,
             "error": self.error,
+            "_input": self._input if self._input and self._input.is_of_files else None,
             "attitude_covariance": self.attitude_covariance,
         }
 
@@ -70,6 +94,16 @@ class Result:
         """ROWORDER of the file."""
         solved: _starpipe.Solved = self.__dict__["_solved"]
         return solved.row_order
+
+    @property
+    def _is_bottom_up(self) -> bool:
+        """Whether the first row is the bottom of the picture as drawn."""
+        return self._row_order == "BOTTOM-UP"
+
+    @property
+    def _name(self) -> str:
+        name: str = self._report["frame"]
+        return name
 
     @cached_property
     def attitude_covariance(self) -> NDArray[np.float64] | None:
@@ -191,37 +225,72 @@ class Result:
         return self._report["timing_ms"]  # type: ignore[no-any-return]
 
     @property
-    def quaternion(self) -> NDArray[np.float64] | None:
-        """Rotation of ICRS vectors into camera axes: [w, x, y, z], w ≥ 0."""
-        attitude = self._report["attitude"]
-        return None if attitude is None else np.array(attitude["quaternion"])
+    def _attitude(self) -> dict[str, Any] | None:
+        attitude: dict[str, Any] | None = self._report["attitude"]
+        return attitude
 
     @property
-    def rotation(self) -> Any:
-        """The same as a ``scipy.spatial.transform.Rotation``."""
-        from scipy.spatial.transform import Rotation
-
-        quaternion = self.quaternion
-        return None if quaternion is None else Rotation.from_quat(np.roll(quaternion, -1))
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the frame."""
+        return self._report["height"], self._report["width"]
 
     @property
-    def center(self) -> Any:
-        """Centre of the frame as a ``SkyCoord``."""
-        from astropy.coordinates import SkyCoord
+    def fov(self) -> Quantity | None:
+        """Field of view: horizontal and vertical, in degrees.
 
-        attitude = self._report["attitude"]
-        if attitude is None:
+        The angles between the middles of opposite borders; NaN where one does not see the sky.
+        """
+        optics = self._report["optics"]
+        if optics is None:
             return None
-        return SkyCoord(attitude["ra_deg"], attitude["dec_deg"], unit="deg", frame="icrs")
+        return quantity([optics["fov_x_deg"], optics["fov_y_deg"]], "deg")
 
     @property
-    def wcs(self) -> Any:
-        """World coordinates of the pixels of `stars` as an ``astropy.wcs.WCS``."""
-        cards = self._wcs_header
-        shape = self._report["height"], self._report["width"]
-        return None if cards is None else wcs_of(cards, shape)
+    def pixel_scale(self) -> Quantity | None:
+        """Angle of a pixel at the frame's centre, in arcseconds per pixel.
 
-    def to_header(self) -> Any:
+        On the axis, for a lens that is no pinhole.
+        """
+        optics = self._report["optics"]
+        if optics is None:
+            return None
+        return quantity(ARCSEC_PER_RAD / optics["focal_length_px"], "arcsec / pix")
+
+    @property
+    def distortion(self) -> Distortion | None:
+        """Distortion of the lens; None also where the stars show none."""
+        optics = self._report["optics"]
+        found = None if optics is None else optics["distortion"]
+        if found is None:
+            return None
+        fields = {name: found[name] for name in Distortion.__slots__}
+        return Distortion(**fields | {"coefficients_px": np.array(found["coefficients_px"])})
+
+    @property
+    def match(self) -> Match | None:
+        """How well the detections match the catalogue."""
+        found = self._report["match"]
+        if found is None:
+            return None
+        known = (self.prediction or {}) | found
+        return Match(**{name: known.get(name) for name in Match.__slots__})
+
+    @property
+    def limit(self) -> Limit | None:
+        """Detected and predicted limiting magnitude."""
+        measured, compared = self._report["photometry"], self._report["magnitude"]
+        if measured is None and compared is None:
+            return None
+        known = (measured or {}) | (compared or {})
+        return Limit(**{name: known.get(name) for name in Limit.__slots__})
+
+    @property
+    def wcs(self) -> WCS | None:
+        """World coordinates of the pixels of `stars`."""
+        cards = self._wcs_header
+        return None if cards is None else wcs_of(cards, self.shape)
+
+    def to_header(self) -> Header | None:
         """Return the same as a FITS header, to be added to that of the file or the array."""
         if self._wcs_header is None:
             return None
@@ -243,7 +312,7 @@ class Result:
         return _tables.star_columns(self._report["stars"])
 
     @property
-    def stars(self) -> Any:
+    def stars(self) -> QTable:
         """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`."""
         columns = self.star_columns
         table = _tables.star_table(columns)
@@ -252,8 +321,8 @@ class Result:
         return table
 
     @property
-    def sky(self) -> Any:
-        """Where `stars` are at the frame's date, as a ``SkyCoord``."""
+    def sky(self) -> SkyCoord | None:
+        """Where `stars` are at the frame's date."""
         from astropy.coordinates import SkyCoord
 
         if not self:
@@ -261,53 +330,161 @@ class Result:
         columns = self.star_columns
         return SkyCoord(columns["ra_deg"], columns["dec_deg"], unit="deg", frame="icrs")
 
-    def to_arrow(self) -> Any:
+    def to_arrow(self) -> Table:
         """Return `star_columns` as a ``pyarrow.Table``."""
         import pyarrow
 
         return pyarrow.table(self.star_columns)
 
-    def plot(self, image: Any = None, *, ax: Any = None, names: int = 20) -> Any:
-        """Draw the detections as rings, with matplotlib.
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        image: ImageLike | None = None,
+        rings: _plot.Rings = "named",
+        names: int = 20,
+    ) -> Axes:
+        """Draw the photograph with its stars marked and named, with matplotlib.
+
+        The photograph is in its own colors where the frame has some, and brightened as in the
+        program's overlays. It is that which was solved: a file is read again. Coordinates are the
+        pixels of `stars`; the rows of a file that begins with the bottom row run upwards.
 
         Parameters
         ----------
-        image : array, optional
-            What to draw them on, its first row on top: the array that was solved, or that
-            ``astropy.io.fits.getdata`` reads from the file.
         ax : matplotlib.axes.Axes, optional
             Where to draw; new axes by default.
+        image : path, array or another image, optional
+            The photograph, where the result has none: of a list of centroids, of an array that
+            `Pipeline.solve_many` was given, or of an array and restored by pickle. Without it the
+            ground is dark.
+        rings : {"named", "all", "none"}
+            Which detections are marked: those that get their name, and all in a frame that is not
+            identified; all; or none. A circle is identified, a square is not, a cross is not
+            shaped like a star.
         names : int
-            How many of the brightest named stars get their name.
+            How many of the brightest stars with a name get it.
 
         Returns
         -------
         matplotlib.axes.Axes
+
+        Raises
+        ------
+        ImportError
+            Without matplotlib.
+        OSError
+            If the file cannot be read. What is in `error` is raised again.
+        ValueError
+            If `image` does not have the size of the frame.
         """
-        from matplotlib import pyplot
+        if self.error is not None:
+            raise self.error
+        frame = self._shown(image)
+        picture = None if frame is None else _starpipe.picture(frame)
+        if picture is not None and picture[1] != self.shape:
+            (found_rows, found_columns), (rows, columns) = picture[1], self.shape
+            sizes = f"{found_columns} x {found_rows} pixels, the frame {columns} x {rows}"
+            raise ValueError(f"the image is {sizes}")
+        return _plot.draw(self, picture, ax, rings, names)
 
-        if ax is None:
-            ax = pyplot.subplots()[1]
-        ax.set_facecolor("0.15")
-        if image is not None:
-            low, high = np.nanpercentile(image, [1.0, 99.8])
-            ax.imshow(image, cmap="gray", vmin=low, vmax=high)
-        stars = self.star_columns
-        is_named = stars["id"] != ""
-        for group, color in ((is_named, "limegreen"), (~is_named, "orange")):
-            x, y = stars["x"][group], stars["y"][group]
-            ax.scatter(x, y, s=60, facecolors="none", edgecolors=color)
-        for index in np.flatnonzero(is_named & (stars["name"] != ""))[:names]:
-            place = stars["x"][index], stars["y"][index]
-            offset = {"xytext": (6, 6), "textcoords": "offset points", "clip_on": True}
-            ax.annotate(str(stars["name"][index]), place, color="gold", fontsize=8, **offset)
-        ax.set_xlim(-0.5, self._report["width"] - 0.5)
-        ax.set_ylim(self._report["height"] - 0.5, -0.5)
-        ax.set_aspect("equal")
-        ax.set_title(repr(self).strip("<>").removeprefix("Result "), fontsize=8)
-        return ax
+    def write_page(
+        self, path: PathLike, *, image: ImageLike | None = None, overwrite: bool = False
+    ) -> None:
+        """Write a page to look at in a browser, as ``starpipe process --html`` does.
 
-    def write(self, path: Any, *, format: str | None = None, **options: Any) -> None:
+        One HTML file without references to others: the answer, the picture with its stars, figures
+        and a table. Pixels are those of `stars`, and the first row is on top.
+
+        Parameters
+        ----------
+        path : path
+            The file; its name ends with ``.html``.
+        image : path, array or another image, optional
+            The picture, as for `plot`; without one the page has none.
+        overwrite : bool
+            Whether to replace a file that exists.
+
+        Raises
+        ------
+        OSError
+            If the file exists, or cannot be written; if the frame cannot be read.
+        ValueError
+            If `image` does not have the size of the frame, or the result was restored by pickle.
+        """
+        content = self._found.page(self._shown(image))
+        _write(path, content.encode(), overwrite)
+
+    def write_regions(self, path: PathLike, *, overwrite: bool = False) -> None:
+        """Write the detections as regions for SAOImage DS9, as ``--regions`` does.
+
+        They are in the pixels of the file, as DS9 counts them.
+
+        Parameters
+        ----------
+        path : path
+            The file; its name ends with ``.reg``.
+        overwrite : bool
+            Whether to replace a file that exists.
+
+        Raises
+        ------
+        OSError
+            If the file exists, or cannot be written.
+        ValueError
+            If the result was restored by pickle.
+        """
+        _write(path, self._found.regions().encode(), overwrite)
+
+    def write_fits(
+        self, path: PathLike, *, image: ImageLike | None = None, overwrite: bool = False
+    ) -> None:
+        """Write a copy of the frame with `wcs` in its header, as ``--write-fits`` does.
+
+        The copy has the pixels that were solved: colors as luminance, calibrated by dark and flat.
+        Its rows are in the order of the array, so its pixels are those of `stars`. Add `to_header`
+        to the header of a file to keep that header.
+
+        Parameters
+        ----------
+        path : path
+            The file; its name ends with ``.fits``.
+        image : path, array or another image, optional
+            The frame, where the result has none, as for `plot`.
+        overwrite : bool
+            Whether to replace a file that exists.
+
+        Raises
+        ------
+        OSError
+            If the file exists, or cannot be written; if the frame cannot be read.
+        ValueError
+            If the stars are not identified, there is no frame, `image` does not have its size, or
+            the result was restored by pickle.
+        """
+        found, frame = self._found, self._shown(image)
+        if frame is None:
+            raise ValueError("the result has no frame to copy: pass it as image=...")
+        content = found.fits_copy(frame)
+        if content is None:
+            raise ValueError(f"a frame that is not identified has no coordinates: {self.reason}")
+        _write(path, content, overwrite)
+
+    @property
+    def _found(self) -> _starpipe.Solved:
+        """What the compiled part found."""
+        if self.error is not None:
+            raise self.error
+        solved: _starpipe.Solved | None = self.__dict__.get("_solved")
+        if solved is None:
+            raise ValueError("a result that was restored by pickle cannot be written: solve again")
+        return solved
+
+    def _shown(self, image: ImageLike | None) -> Input | None:
+        """Return the frame to show: `image`, or what was solved."""
+        return self._input if image is None else Input(Image(image).pixels)
+
+    def write(self, path: PathLike, *, format: str | None = None, **options: Any) -> None:
         """Write `stars` as ``QTable.write`` does: ECSV, VOTable, Parquet and more."""
         stars = self.stars
         if format is None and str(path).endswith((".vot", ".votable")):
@@ -323,7 +500,14 @@ class Result:
         stars.write(path, format=format, **options)
 
 
-def wcs_of(cards: bytes, shape: tuple[int, int]) -> Any:
+def _write(path: PathLike, content: bytes, overwrite: bool) -> None:
+    """Write a file, whole or not at all."""
+    if not overwrite and os.path.lexists(path):
+        raise FileExistsError(f"{os.fspath(path)} exists; overwrite=True replaces it")
+    _starpipe.write_file(path, content)
+
+
+def wcs_of(cards: bytes, shape: tuple[int, ...]) -> WCS:
     """Return the world coordinates in the cards of a header, of an image of `shape`."""
     from astropy.wcs import WCS
 
@@ -335,7 +519,7 @@ def wcs_of(cards: bytes, shape: tuple[int, int]) -> Any:
     return wcs
 
 
-def _header(cards: bytes) -> Any:
+def _header(cards: bytes) -> Header:
     from astropy.io.fits import Header
 
     return Header.fromstring(cards)

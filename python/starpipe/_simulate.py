@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,14 @@ from . import _starpipe, _tables
 from ._camera import PathLike, stated
 from ._hints import direction, iso_date, number, whole_number, within
 from ._result import wcs_of
+
+if TYPE_CHECKING:
+    from astropy.coordinates import Angle
+    from astropy.table import QTable
+    from astropy.units import Quantity
+    from astropy.wcs import WCS
+
+    from ._options import DateLike
 
 
 class Simulation:
@@ -48,8 +56,8 @@ class Simulation:
         return f"<Simulation {columns} x {rows}: {what}>"
 
     @property
-    def wcs(self) -> Any:
-        """True world coordinates as an ``astropy.wcs.WCS``; distortion is not in them."""
+    def wcs(self) -> WCS | None:
+        """True world coordinates; distortion is not in them."""
         shape = self.image.shape
         return None if self._wcs_header is None else wcs_of(self._wcs_header, shape)
 
@@ -59,7 +67,7 @@ class Simulation:
         return _tables.columns(json.loads(self._truth or "[]"))
 
     @property
-    def stars(self) -> Any:
+    def stars(self) -> QTable:
         """What is on the frame as a ``QTable``; without astropy `columns`."""
         units = {"vmag": "mag", "bv_mag": "mag", "ra_deg": "deg", "dec_deg": "deg"}
         places = dict.fromkeys(("x", "y", "x_end", "y_end"), "pix")
@@ -69,15 +77,15 @@ class Simulation:
 def simulate(
     camera: PathLike,
     *,
-    ra: Any = None,
-    dec: Any = None,
-    roll: Any = 0.0,
+    ra: Angle | Quantity | float | None = None,
+    dec: Angle | Quantity | float | None = None,
+    roll: Angle | Quantity | float = 0.0,
     dark: bool = False,
     flat: float | None = None,
-    date: Any = None,
+    date: DateLike | None = None,
     seed: int = 1,
     frame: int = 0,
-    exposure: Any = None,
+    exposure: Quantity | float | None = None,
     catalog: PathLike | None = None,
     **parameters: float,
 ) -> Simulation:

@@ -1,6 +1,6 @@
 from collections.abc import Iterable, Sequence
 from os import PathLike
-from typing import Any, TypeAlias, final
+from typing import Any, Protocol, TypeAlias, final, type_check_only
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,15 @@ __all__ = [
     "ArchivePlan",
     "DarkFrames",
     "Darks",
+    "FlatFrames",
+    "Flats",
     "Page",
     "Pages",
     "PartRows",
     "Pipeline",
     "Simulated",
     "Solved",
+    "Tracker",
     "archive_differences",
     "archive_nights",
     "archive_plan",
@@ -23,11 +26,13 @@ __all__ = [
     "defocus",
     "detect",
     "limit",
+    "picture",
     "read_page",
     "robustness",
     "simulate",
     "star_columns",
     "validate",
+    "write_file",
 ]
 
 _Path: TypeAlias = str | PathLike[str]
@@ -44,6 +49,21 @@ _Image: TypeAlias = (
 )
 """Arrays of 2 dimensions; of float32 and int64 also of 3: the last is that of the colors."""
 
+@type_check_only
+class _Input(Protocol):
+    @property
+    def image(self) -> _Image: ...
+    @property
+    def name(self) -> _Path | None: ...
+    @property
+    def mask(self) -> NDArray[np.bool_] | None: ...
+    @property
+    def dark(self) -> _Image | None: ...
+    @property
+    def flat(self) -> _Image | None: ...
+    @property
+    def bias_adu(self) -> float: ...
+
 @final
 class Pipeline:
     def __new__(
@@ -52,16 +72,10 @@ class Pipeline:
         camera: _Path | None,
         cache_dir: _Path | None,
     ) -> Pipeline: ...
+    @property
+    def bias_adu(self) -> float: ...
     def solve(
-        self,
-        image: _Image,
-        name: _Path | None,
-        mask: NDArray[np.bool_] | None,
-        options: dict[str, Any],
-        dark: _Image | None,
-        flat: _Image | None,
-        threads: int,
-        as_drawn: bool,
+        self, frame: _Input, options: dict[str, Any], threads: int, as_drawn: bool
     ) -> Solved: ...
     def identify(
         self,
@@ -80,6 +94,9 @@ class Solved:
     def timeout(self) -> str | None: ...
     def json(self) -> str: ...
     def wcs_header(self) -> bytes | None: ...
+    def page(self, frame: _Input | None) -> str: ...
+    def regions(self) -> str: ...
+    def fits_copy(self, frame: _Input) -> bytes | None: ...
     @property
     def row_order(self) -> str | None: ...
     def attitude_covariance_rad2(self) -> list[list[float]] | None: ...
@@ -151,6 +168,27 @@ class Darks:
     def noise_adu(self) -> NDArray[np.float32] | None: ...
     def hot_pixels(self) -> str: ...
 
+@final
+class FlatFrames:
+    def __new__(cls, dark: _Image | None, camera: _Path | None) -> FlatFrames: ...
+    def add(self, image: _Image) -> None: ...
+    def measure(self) -> Flats: ...
+
+@final
+class Flats:
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    def json(self) -> str: ...
+    def master(self) -> NDArray[np.float32]: ...
+
+@final
+class Tracker:
+    def __new__(cls, pipeline: Pipeline, options: dict[str, Any], max_stars: int) -> Tracker: ...
+    def track(self, frame: _Input, time_s: float | None) -> str: ...
+    def reset(self) -> None: ...
+
+def picture(frame: _Input) -> tuple[NDArray[np.uint8], tuple[int, int]]: ...
+def write_file(path: _Path, content: bytes) -> None: ...
 def star_columns() -> list[list[str]]: ...
 def check_size(width: int, height: int) -> None: ...
 def detect(

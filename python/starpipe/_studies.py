@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,17 @@ from ._camera import PathLike, stated
 from ._darks import Darks
 from ._hints import positive, thread_count, whole_number, within
 
+if TYPE_CHECKING:
+    from astropy.table import QTable
+    from astropy.units import Quantity
+
 
 def limit(
-    camera: PathLike, *, exposure: Any = None, reading: str | None = None, **parameters: float
+    camera: PathLike,
+    *,
+    exposure: Quantity | float | None = None,
+    reading: Literal["paper", "physical"] | None = None,
+    **parameters: float,
 ) -> dict[str, Any]:
     """Predict the limiting magnitude of a camera.
 
@@ -64,12 +72,12 @@ class Validation:
         )
 
     @property
-    def frames(self) -> Any:
+    def frames(self) -> QTable:
         """A row for each frame, as a ``QTable`` or a dict of arrays."""
         return _tables.table(_tables.columns(self._frames), {})
 
     @property
-    def stars(self) -> Any:
+    def stars(self) -> QTable:
         """A row for each true star and each other detection, as a ``QTable`` or a dict."""
         return _tables.table(_tables.columns(self._stars), {})
 
@@ -81,7 +89,7 @@ def validate(
     seed: int = 1,
     scale_known: bool = True,
     threads: int = 1,
-    exposure: Any = None,
+    exposure: Quantity | float | None = None,
     catalog: PathLike | None = None,
     **parameters: float,
 ) -> Validation:
@@ -114,7 +122,7 @@ def validate(
 
 def robustness(
     *,
-    fov: Any = None,
+    fov: Quantity | float | None = None,
     count: int = 2000,
     seed: int = 1,
     threads: int = 1,
@@ -185,7 +193,7 @@ def defocus(
     count: int | None = None,
     seed: int = 1,
     threads: int = 1,
-    exposure: Any = None,
+    exposure: Quantity | float | None = None,
     **parameters: float,
 ) -> dict[str, Any]:
     """Measure the error of centroids over the radius of the spot, and the radius to set.

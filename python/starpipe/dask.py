@@ -26,6 +26,7 @@ import fsspec
 
 from . import _starpipe
 from ._hints import whole_number
+from ._images import Input
 from ._options import SolveOptions, solve_options, takes_options
 from ._pipeline import Pipeline
 
@@ -296,16 +297,7 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
             try:
                 if isinstance(image, Exception):
                     raise image
-                solved = pipeline.solve(
-                    image,
-                    name,
-                    None,
-                    job.stated,
-                    None,
-                    None,
-                    1,
-                    True,
-                )
+                solved = pipeline.solve(Input(image, name), job.stated, 1, True)
                 status = rows.add(solved)
             except (*FINAL, TimeoutError, ValueError, RuntimeError) as error:
                 rows.add_unread(name, str(error).replace("\n", " "))

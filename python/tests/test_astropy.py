@@ -1,6 +1,7 @@
 """The answer as astropy's objects."""
 
 import gzip
+from dataclasses import FrozenInstanceError, asdict
 
 import numpy as np
 import pytest
@@ -60,6 +61,70 @@ def test_the_covariance_is_that_of_the_stated_errors(result):
     found = np.sqrt(np.diag(result.attitude_covariance)) * u.rad
     np.testing.assert_allclose(found.to_value("arcsec"), stated.value, rtol=6e-3)
     np.testing.assert_allclose(result.attitude_covariance, result.attitude_covariance.T)
+
+
+def test_what_was_measured_has_its_units(result):
+    report = result.to_dict()
+    attitude, optics = report["attitude"], report["optics"]
+    assert result.shape == (report["height"], report["width"])
+    assert list(result.fov.to_value("deg")) == [optics["fov_x_deg"], optics["fov_y_deg"]]
+    half = result.fov[0] / 2
+    scale = result.pixel_scale.to(u.rad / u.pix)
+    assert scale.value * optics["focal_length_px"] == pytest.approx(1.0)
+    assert result.shape[1] / 2 * scale.value == pytest.approx(np.tan(half).value, rel=0.01)
+    assert result.roll.to_value("deg") == attitude["up_pa_deg"]
+    sigma = attitude["sigma_arcsec"]
+    assert list(result.center_err.to_value("arcsec")) == [sigma["y"], sigma["x"]]
+    assert result.roll_err.to_value("arcsec") == sigma["roll"]
+    assert asdict(result.match) == report["match"] | {"stars_expected": None}
+    with pytest.raises(FrozenInstanceError):
+        result.match.matched = 0
+
+
+def test_up_has_the_position_angle_of_roll(result):
+    rows, columns = result.shape
+    middle = result.wcs.pixel_to_world((columns - 1) / 2, (rows - 1) / 2)
+    up = result.wcs.pixel_to_world((columns - 1) / 2, (rows - 1) / 2 - 1.0)
+    assert middle.separation(result.center) < 1 * u.arcsec
+    difference = (middle.position_angle(up) - result.roll).wrap_at(180 * u.deg)
+    assert abs(difference) < 0.1 * u.deg
+
+
+def test_the_limit_is_detected_and_predicted(frame, result):
+    measured = result.to_dict()["photometry"]
+    assert result.limit.limit50_vmag == measured["limit50_vmag"]
+    assert result.limit.limit50_sigma_mag == measured["limit50_sigma_mag"]
+    assert result.limit.faintest_vmag == np.nanmax(result.star_columns["vmag"])
+    assert result.limit.predicted_limit_vmag is None
+    compared = sp.Pipeline(camera=frame.parent / "camera.toml").solve(frame, exposure=0.2)
+    assert compared.limit.predicted_limit_vmag == compared.prediction["limit50_vmag"]
+    difference = compared.limit.limit50_vmag - compared.limit.predicted_limit_vmag
+    assert compared.limit.limit_difference_mag == pytest.approx(difference, abs=0.011)
+    assert compared.limit.limit_difference_sigma_mag > 0.0
+    assert compared.match.stars_expected == compared.prediction["stars_expected"] > 10
+
+
+def test_a_distortion_is_that_of_the_report(pipeline, frame, result):
+    distorted = pipeline.solve(frame.parents[1] / "regression" / "distorted.tif")
+    found, expected = distorted.distortion, distorted.to_dict()["optics"]["distortion"]
+    assert (found.model, found.largest_px) == (expected["model"], expected["largest_px"])
+    np.testing.assert_array_equal(found.coefficients_px, expected["coefficients_px"])
+    expected = result.to_dict()["optics"]["distortion"]
+    assert (result.distortion is None) == (expected is None)
+
+
+def test_what_is_not_identified_has_no_measurements(pipeline):
+    noise = np.random.default_rng(1).normal(500.0, 5.0, (300, 400))
+    found = pipeline.solve(noise)
+    names = ("fov", "pixel_scale", "roll", "roll_err", "center", "center_err", "distortion")
+    for name in (*names, "match", "limit", "quaternion", "rotation", "sky", "wcs"):
+        assert getattr(found, name) is None
+    assert found.shape == (300, 400)
+
+
+def test_a_scale_that_was_measured_is_a_hint(pipeline, pixels, result):
+    for known in ({"pixel_scale": result.pixel_scale}, {"fov": result.fov[0]}):
+        assert pipeline.solve(pixels, scale_error=1, **known)
 
 
 @pytest.mark.parametrize("format", ["ascii.ecsv", "votable", "parquet.votable", "fits"])

@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 from astropy import units as u
+from PIL import Image
 
 import starpipe as sp
 
@@ -17,8 +18,6 @@ def test_a_simulated_frame_is_that_of_the_program(program, tmp_path):
     frame = tmp_path / "frame.tif"
     subprocess.run([program, "simulate", *options, "--out", frame], check=True)
     simulated = sp.simulate(CAMERA, seed=3, frame=5)
-    from PIL import Image
-
     assert np.array_equal(np.array(Image.open(frame)), simulated.image)
     rows = (tmp_path / "frame.csv").read_text().splitlines()
     assert len(simulated.stars) == len(rows) - 1
@@ -87,6 +86,34 @@ def test_darks_give_master_mask_and_noise(pipeline):
     assert pipeline.solve(image, found.mask, dark=master)
 
 
+def test_flats_give_a_master_and_the_gain_of_the_program(program, pipeline, tmp_path):
+    light = [2000.0, 2000.0, 6000.0, 6000.0]
+    frames = [sp.simulate(CAMERA, flat=e, frame=n).image for n, e in enumerate(light)]
+    dark = sp.simulate(CAMERA, dark=True).image
+    found = sp.flats(frames, dark=dark)
+    assert found.master.shape == dark.shape and found.master.dtype == np.float32
+    assert np.nanmean(found.master) == pytest.approx(1.0, abs=1e-3)
+    paths = []
+    for number, image in enumerate([*frames, dark]):
+        paths.append(tmp_path / f"{number}.tif")
+        Image.fromarray(image).save(paths[-1])
+    command = [program, "flats", "--format", "json", "--dark", paths[-1], *paths[:-1]]
+    printed = subprocess.run(command, capture_output=True, check=True)
+    expected = json.loads(printed.stdout)
+    assert sp.flats(paths[:-1], dark=paths[-1]).report == expected
+    assert found.report["gain_e_per_adu"] == expected["gain_e_per_adu"] > 0.0
+    image = sp.simulate(CAMERA, ra=83.8, dec=-1.2).image
+    assert pipeline.solve(image, dark=dark, flat=found.master)
+
+
+def test_flats_without_a_level_of_darkness_warn(caplog):
+    flat = sp.simulate(CAMERA, flat=8000.0).image
+    assert sp.flats([flat], camera=CAMERA).report["gain_e_per_adu"] is None
+    assert not caplog.records
+    sp.flats([flat])
+    assert "assumed to be 0" in caplog.text
+
+
 @pytest.mark.parametrize("camera", [None, CAMERA])
 def test_the_best_radius_is_the_programs(program, camera):
     command = [program, "defocus", "--trials", "4", "--required-error", "0.05"]
@@ -115,6 +142,9 @@ def test_the_best_radius_is_the_programs(program, camera):
         (lambda: sp.robustness(missing=200.0), "missing must be from 0 to 100"),
         (lambda: sp.defocus(vmag=5.0), "are of a camera"),
         (lambda: sp.darks([]), "frame"),
+        (lambda: sp.flats([], camera=CAMERA), "frame"),
+        (lambda: sp.flats([np.ones((9, 9)), np.ones((9, 8))], camera=CAMERA), "9|light"),
+        (lambda: sp.flats([np.zeros((9, 9))], camera=CAMERA), "light"),
         (lambda: sp.darks([np.zeros((9, 9)), np.zeros((9, 8))]), "9"),
         (lambda: sp.darks([np.zeros((9, 9))], exposure=[1.0, 2.0]), "2 exposures"),
     ],

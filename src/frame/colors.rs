@@ -25,23 +25,36 @@ pub struct Colors {
 }
 
 impl Colors {
+    /// The colors of the pixels of `frame`, in their order; 65535 is full scale. `None` where they are not
+    /// as many.
+    #[doc(hidden)]
+    pub fn new(frame: &Frame, pixels: Vec<[u16; 3]>) -> Option<Self> {
+        (pixels.len() == frame.size().pixels()).then(|| Self {
+            step: f32::from(step_of(&pixels)),
+            pixels,
+        })
+    }
+
     /// The colors in the file `path`, of which `frame` was read: of a PNG, JPEG, BMP, PNM or TIFF file with one
     /// color image. `None` where there are none, or where they cannot be read or held: `frame` was.
     pub fn read(path: &Path, frame: &Frame, buffers: &mut Buffers) -> Option<Self> {
         let mut bytes = Vec::new();
         let file = files::open(path).ok()?;
         file.take(MAX_FILE_BYTES).read_to_end(&mut bytes).ok()?;
+        Self::decode(&bytes, frame, buffers)
+    }
+
+    /// [`Self::read`] for the content of a file.
+    #[doc(hidden)]
+    pub fn decode(bytes: &[u8], frame: &Frame, buffers: &mut Buffers) -> Option<Self> {
         let account = buffers.account(bytes.len()).ok()?;
-        let (size, pixels) = no_panic(|| decode(&bytes, &account)).ok()??;
+        let (size, pixels) = no_panic(|| decode(bytes, &account)).ok()??;
         if size != frame.stored_size() {
             return None;
         }
         let mut pixels = Cow::Owned(pixels);
         frame.metadata.orientation.turn(&mut pixels, size.width);
-        Some(Self {
-            step: f32::from(step_of(&pixels)),
-            pixels: pixels.into_owned(),
-        })
+        Self::new(frame, pixels.into_owned())
     }
 }
 

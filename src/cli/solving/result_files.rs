@@ -7,7 +7,7 @@ use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
-use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit};
+use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
 use starpipe::report::{FrameReport, page, regions, tables, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
@@ -77,7 +77,7 @@ impl<'a> ResultFiles<'a> {
             files.push((path("reg"), regions::ds9(report).into_bytes()));
         }
         if let Some(frame) = frame.filter(|_| self.options.write_fits) {
-            let copy = wcs::solved_copy(&report.frame, frame, &solved.solution)?;
+            let copy = wcs::solved_copy(&report.frame, frame, &solved.solution, RowOrder::TopDown)?;
             files.extend(copy.map(|copy| (path("solved.fits"), copy)));
         }
         let header = wcs::header(&report.frame, &solved.solution);

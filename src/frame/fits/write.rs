@@ -77,16 +77,27 @@ pub enum FitsWriteError {
 /// # Reference
 /// FITS Standard 4.0 (2018), sect. 4.4 and 5.
 pub fn write_fits(
+    writer: impl Write,
+    frame: &Frame,
+    samples: FitsSamples,
+    header: &FitsHeader,
+) -> Result<(), FitsWriteError> {
+    write_rows(writer, frame, samples, header, RowOrder::TopDown)
+}
+
+/// [`write_fits`] for a frame whose rows have this order.
+pub(crate) fn write_rows(
     mut writer: impl Write,
     frame: &Frame,
     samples: FitsSamples,
     header: &FitsHeader,
+    row_order: RowOrder,
 ) -> Result<(), FitsWriteError> {
     check_keywords(header)?;
     if samples == FitsSamples::Unsigned16 {
         check_levels(frame)?;
     }
-    let mut cards = mandatory(frame, samples);
+    let mut cards = mandatory(frame, samples, row_order);
     cards.extend(header);
     writer.write_all(&cards.to_bytes())?;
     let mut length = 0;
@@ -109,7 +120,7 @@ pub fn write_fits(
 }
 
 /// The cards that describe the image.
-fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
+fn mandatory(frame: &Frame, samples: FitsSamples, row_order: RowOrder) -> FitsHeader {
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS Standard 4.0");
     let bits = match samples {
@@ -120,8 +131,11 @@ fn mandatory(frame: &Frame, samples: FitsSamples) -> FitsHeader {
     header.integer("NAXIS", 2, "");
     header.integer("NAXIS1", frame.width as i64, "columns");
     header.integer("NAXIS2", frame.height as i64, "rows");
-    let order = RowOrder::TopDown.keyword_value();
-    header.text("ROWORDER", order, "the first row is the top");
+    let first = match row_order {
+        RowOrder::TopDown => "the first row is the top",
+        RowOrder::BottomUp => "the first row is the bottom",
+    };
+    header.text("ROWORDER", row_order.keyword_value(), first);
     if samples == FitsSamples::Unsigned16 {
         header.integer("BZERO", 1 << 15, "levels are unsigned");
         header.integer("BSCALE", 1, "");
@@ -232,6 +246,18 @@ mod tests {
         let back = crate::frame::decode(&bytes).unwrap();
         assert_eq!(back.metadata.exposure_s, Some(0.25));
         assert_eq!((back.step_adu, back.saturation_adu), (0.0, None));
+    }
+
+    #[test]
+    fn rows_as_stored_are_drawn_as_the_file_says() {
+        let frame = frame_of((0..9_u8).map(f32::from).collect());
+        let mut bytes = Vec::new();
+        let header = FitsHeader::default();
+        let order = RowOrder::BottomUp;
+        write_rows(&mut bytes, &frame, FitsSamples::Unsigned16, &header, order).unwrap();
+        let drawn = crate::frame::decode(&bytes).unwrap();
+        assert_eq!(drawn.at(0, 0), 6.0);
+        assert_eq!(drawn.as_stored().pixels, frame.pixels);
     }
 
     proptest! {

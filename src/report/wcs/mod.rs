@@ -20,7 +20,7 @@ use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
 use crate::frame::{
-    COPY_CREATOR, FitsHeader, FitsSamples, FitsWriteError, Frame, RowOrder, write_fits,
+    COPY_CREATOR, FitsHeader, FitsSamples, FitsWriteError, Frame, RowOrder, write_rows,
 };
 use crate::identify::{Identification, SkyView};
 use crate::pipeline::{Outcome, Solution};
@@ -67,8 +67,10 @@ pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
     Some(header.to_bytes())
 }
 
-/// A copy of the frame named `name` as FITS, its top row first, with its coordinates in the header; `None`
-/// where it is not identified. Levels are unsigned integers of 16 bits where all of them fit, else floats.
+/// A copy of the frame named `name` as FITS, with its coordinates in the header; `None` where it is not
+/// identified. Its first row is the first of `frame`, and ROWORDER says `row_order`: frames have the top row first
+/// unless they are [as stored](Frame::as_stored). Levels are unsigned integers of 16 bits where all of them fit,
+/// else floats.
 ///
 /// # Errors
 /// None of a frame that was read.
@@ -76,6 +78,7 @@ pub fn solved_copy(
     name: &str,
     frame: &Frame,
     solution: &Solution,
+    row_order: RowOrder,
 ) -> Result<Option<Vec<u8>>, FitsWriteError> {
     let Some(solved) = cards(name, solution, RowOrder::TopDown) else {
         return Ok(None);
@@ -88,7 +91,7 @@ pub fn solved_copy(
     header.extend(&solved);
     let write = |samples| {
         let mut file = Vec::new();
-        write_fits(&mut file, frame, samples, &header).map(|()| file)
+        write_rows(&mut file, frame, samples, &header, row_order).map(|()| file)
     };
     let file = match write(FitsSamples::Unsigned16) {
         Err(FitsWriteError::NoLevel { .. }) => write(FitsSamples::Float32),
