@@ -35,6 +35,8 @@ struct StarColumns<'a> {
     flux: Vec<Option<f64>>,
     id: Vec<Option<&'a str>>,
     name: Vec<Option<&'a str>>,
+    hip: Vec<Option<u32>>,
+    hd: Vec<Option<u32>>,
     v: Vec<Option<f64>>,
     ra: Vec<Option<f64>>,
     dec: Vec<Option<f64>>,
@@ -52,6 +54,8 @@ impl<'a> StarColumns<'a> {
         self.flux.push(star.flux);
         self.id.push(star.id.as_deref());
         self.name.push(star.name.as_deref());
+        self.hip.push(star.hip);
+        self.hd.push(star.hd);
         self.v.push(star.vmag);
         self.ra.push(star.ra_deg.map(|ra| rounded(ra, 4)));
         self.dec.push(star.dec_deg.map(|dec| rounded(dec, 4)));

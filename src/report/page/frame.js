@@ -72,7 +72,7 @@
     const named = shown.filter((star) => star.name);
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
       if (taken.length >= MOST) break;
-      const text = star.name || star.id;
+      const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
       const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
       const room = [at[0], at[1] - SIZE * u, at[0] + text.length * SIZE * 0.6 * u, at[1] + 3 * u];
       if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
@@ -146,6 +146,8 @@
   const tell = (star) => {
     const parts = [star.name || star.id || (star.kind === "other" ? "not a star" : "not identified")];
     if (star.name && star.id) parts.push(star.id);
+    if (star.hd) parts.push(`HD ${star.hd}`);
+    if (star.hip) parts.push(`HIP ${star.hip}`);
     if (star.v !== undefined) parts.push(`V ${number(star.v, 2)}`);
     if (star.ra !== undefined) parts.push(`RA ${number(star.ra, 4)}° Dec ${number(star.dec, 4)}°`);
     parts.push(`x ${number(star.x, 2)} y ${number(star.y, 2)}`);
@@ -173,7 +175,7 @@
   const text = (key) => (s) => s[key] || "";
   const column = (key, title, shown, isText = false) => ({ key, title, isText, text: shown, value: (s) => s[key] });
   const table = makeTable(document.querySelector("section.table"), [
-    column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true),
+    column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true), column("hd", "HD", text("hd")),
     column("v", "V", (s) => number(s.v, 2)), column("snr", "SNR", (s) => s.snr ?? ""), column("flux", "Flux", (s) => s.flux ?? ""),
     column("x", "x", (s) => number(s.x, 2)), column("y", "y", (s) => number(s.y, 2)),
     column("ra", "RA (°)", (s) => number(s.ra, 4)), column("dec", "Dec (°)", (s) => number(s.dec, 4)),
@@ -181,7 +183,7 @@
     { ...column("flags", "Flags", (s) => s.flags.join(" "), true), value: (s) => s.flags.join(" ") || undefined },
   ], stars, {
     choose: (star) => choose(star, true),
-    words: (star) => star.kind,
+    words: (star) => `${star.kind} ${star.hd ? `hd${star.hd} hd ${star.hd}` : ""} ${star.hip ? `hip${star.hip} hip ${star.hip}` : ""}`,
     filtered: (order) => {
       const fitting = new Set(order);
       for (const star of stars) star.shape.style.display = fitting.has(star) ? "" : "none";
