@@ -1,6 +1,6 @@
 //! The page of an archive.
 
-use super::{NightLine, nights_text};
+use super::nights::{NightLine, nights_text};
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{figure, options, table, thumbnails};
 use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
