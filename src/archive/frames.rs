@@ -13,7 +13,6 @@ pub struct FrameSummary {
     pub frame: String,
     pub status: String,
     pub reason_code: String,
-    pub reason: String,
     pub night: String,
     pub t_min: Option<f64>,
     pub exposure_s: Option<f64>,
@@ -30,6 +29,7 @@ pub struct FrameSummary {
     pub limit_difference_mag: Option<f64>,
     pub sky_mag_arcsec2: Option<f64>,
     pub notes: String,
+    pub reason: String,
 }
 
 const COLUMNS: [&str; 20] = [

@@ -100,6 +100,9 @@ pub(crate) fn catalog(catalog: &Catalog) -> Fact {
     )
 }
 
+/// Frames that are read for small pictures: many may be gone, or no images.
+const MOST_TRIED: usize = 4 * Thumbnail::MOST;
+
 /// Small pictures of frames that are named as files, or as images of files (`mosaic.fits[1]`), each with what is
 /// to be said of it: the first ones of those that can be read.
 pub(crate) fn thumbnails(frames: impl IntoIterator<Item = (String, String)>) -> Vec<Thumbnail> {
@@ -113,6 +116,7 @@ pub(crate) fn thumbnails(frames: impl IntoIterator<Item = (String, String)>) -> 
     };
     frames
         .into_iter()
+        .take(MOST_TRIED)
         .filter_map(picture)
         .take(Thumbnail::MOST)
         .collect()

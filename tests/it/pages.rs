@@ -43,6 +43,7 @@ impl Page {
 
     /// The title, which is the heading, too.
     fn is_titled(&self, title: &str) {
+        let title = title.replace('&', "&amp;").replace('/', "&#x2f;");
         self.has(&format!("<title>{title} · starpipe</title>"));
         self.has(&format!("<h1>{title}</h1>"));
     }
@@ -73,7 +74,7 @@ impl Page {
     }
 
     fn figures(&self) -> usize {
-        self.html.matches("class=\"drawing\"").count()
+        self.html.matches("class=\"drawing").count()
     }
 }
 

@@ -1,5 +1,6 @@
 //! `archive`: how far an archive is, its tables in one file each, and what its nights were like.
 
+mod nights;
 mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
@@ -8,8 +9,9 @@ use super::output::files::{make_directory, write_whole};
 use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
-use starpipe::archive::{Archive, NightSummary, Status, merge, status, summary};
-use starpipe::base::format::{counted, printable};
+use nights::{NightLine, nights_text};
+use starpipe::archive::{Archive, Status, merge, status, summary};
+use starpipe::base::format::printable;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -153,80 +155,4 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
         Format::Json => json_lines(nights.iter())?,
         Format::Csv => csv_table(nights.iter().map(NightLine::of))?,
     }))
-}
-
-/// A night as a line of CSV: its reasons in one cell.
-#[derive(serde::Serialize)]
-struct NightLine<'a> {
-    night: &'a str,
-    camera: &'a str,
-    frames: usize,
-    identified: usize,
-    unread: usize,
-    reasons: String,
-    limit50_vmag: Option<f64>,
-    predicted_limit50_vmag: Option<f64>,
-    limit_difference_mag: Option<f64>,
-    sky_mag_arcsec2: Option<f64>,
-    zero_point_vmag: Option<f64>,
-    zero_point_change_mag: Option<f64>,
-    pointing_drift_deg: Option<f64>,
-}
-
-impl<'a> NightLine<'a> {
-    fn of(night: &'a NightSummary) -> Self {
-        Self {
-            night: &night.night,
-            camera: &night.camera,
-            frames: night.frames,
-            identified: night.identified,
-            unread: night.unread,
-            reasons: reasons_text(night),
-            limit50_vmag: night.limit50_vmag,
-            predicted_limit50_vmag: night.predicted_limit50_vmag,
-            limit_difference_mag: night.limit_difference_mag,
-            sky_mag_arcsec2: night.sky_mag_arcsec2,
-            zero_point_vmag: night.zero_point_vmag,
-            zero_point_change_mag: night.zero_point_change_mag,
-            pointing_drift_deg: night.pointing_drift_deg,
-        }
-    }
-}
-
-fn reasons_text(night: &NightSummary) -> String {
-    let counted = night.reasons.iter();
-    let counted = counted.map(|(code, frames)| format!("{code} {frames}"));
-    counted.collect::<Vec<_>>().join(", ")
-}
-
-/// The text, or what stands for none.
-fn or<'a>(text: &'a str, none: &'a str) -> &'a str {
-    if text.is_empty() { none } else { text }
-}
-
-fn nights_text(nights: &[NightSummary]) -> String {
-    let mut text =
-        "night       camera            frames  identified   limit  predicted  difference     \
-                    sky  zero point  drift (deg)  reasons\n"
-            .to_owned();
-    for night in nights {
-        let cell = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
-        let _ = writeln!(
-            text,
-            "{:<10}  {:<16}  {:>6}  {:>10}  {:>6}  {:>9}  {:>10}  {:>6}  {:>10}  {:>11}  {}",
-            or(&night.night, "no date"),
-            printable(or(&night.camera, "-")),
-            night.frames,
-            night.identified,
-            cell(night.limit50_vmag),
-            cell(night.predicted_limit50_vmag),
-            cell(night.limit_difference_mag),
-            cell(night.sky_mag_arcsec2),
-            cell(night.zero_point_vmag),
-            cell(night.pointing_drift_deg),
-            reasons_text(night)
-        );
-    }
-    let frames = nights.iter().map(|night| night.frames).sum();
-    text + &format!("{}\n", counted(frames, "frame"))
 }

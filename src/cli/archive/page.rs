@@ -1,6 +1,6 @@
 //! The page of an archive.
 
-use super::{NightLine, nights_text};
+use super::nights::{NightLine, nights_text};
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{figure, options, table, thumbnails};
 use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
@@ -17,12 +17,15 @@ const MOST_POINTS: usize = 400;
 /// Longer runs have their dates in days, shorter ones in hours.
 const LONG_DAYS: f64 = 2.0;
 
+const NO_PICTURES: &str =
+    "There are no pictures of the frames that failed: none of them can be read where it was.";
+
 /// The page of the frames and nights of an archive.
 pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<Page> {
     let mut frames = frames(archive)?;
     let failed = |frame: &FrameSummary| !frame.is_identified();
     let reasons = reasons(frames.iter().filter(|frame| failed(frame)));
-    let notes = notes(archive, &frames, &reasons)?;
+    let mut notes = notes(archive, &frames, &reasons)?;
     let figures = limits(&frames)?;
     let mut tables = Vec::new();
     if !reasons.is_empty() {
@@ -32,7 +35,10 @@ pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<P
     // Failures first, otherwise by name.
     frames.sort_by_key(|frame| frame.is_identified());
     let pictures = frames.iter().filter(|frame| failed(frame));
-    let pictures = pictures.map(|frame| (frame.frame.clone(), frame.reason.clone()));
+    let thumbnails = thumbnails(pictures.map(|frame| (frame.frame.clone(), frame.reason.clone())));
+    if thumbnails.is_empty() && frames.iter().any(failed) {
+        notes.push(NO_PICTURES.to_owned());
+    }
     tables.push(table(
         "Nights",
         &csv_table(nights.iter().map(NightLine::of))?,
@@ -47,7 +53,7 @@ pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<P
         text: nights_text(nights),
         figures,
         thumbnails_title: "Frames that are not identified".to_owned(),
-        thumbnails: thumbnails(pictures),
+        thumbnails,
         tables,
         provenance: provenance(archive)?,
     })

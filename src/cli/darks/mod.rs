@@ -1,6 +1,7 @@
 //! `darks`: measures noise, pattern, dark current and hot pixels on frames taken without light.
 
 mod figure;
+mod files;
 mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
@@ -10,16 +11,13 @@ use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
 use super::output::files::{NewFile, make_directory, write_whole};
-use super::output::master::{fits_image, header};
 use super::output::messages::report_warning;
 use super::output::overwrite;
-use super::output::rows::{csv_table, finished, json_line};
+use super::output::rows::{csv_table, json_line};
 use super::page::HtmlOption;
 use clap::Args;
-use starpipe::base::size::Size;
 use starpipe::calibration::darks::{
-    DarkConfig, DarkStack, Darks, ExposureGroup, FrameStatistics, FullScaleSource, HOT_SIGMA,
-    HotPixelRow,
+    DarkConfig, DarkStack, Darks, FrameStatistics, FullScaleSource, HOT_SIGMA,
 };
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Frame;
@@ -184,7 +182,7 @@ fn results(
     darks: &Darks,
     frames: &[PathBuf],
 ) -> Result<Vec<NewFile>, CommandError> {
-    let files = files(darks)?.into_iter();
+    let files = files::of(darks)?.into_iter();
     let results: Vec<NewFile> = files
         .map(|(name, content)| (directory.join(name), content))
         .collect();
@@ -192,58 +190,4 @@ fn results(
     overwrite::check_results(frames, &paths)?;
     make_directory(directory)?;
     Ok(results)
-}
-
-/// Names and contents of the files for `--out`.
-fn files(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
-    let mut files = Vec::new();
-    for group in &darks.groups {
-        let name = match group.exposure_s {
-            _ if darks.groups.len() == 1 => "master-dark.fits".to_owned(),
-            Some(exposure_s) => format!("master-dark-{exposure_s}s.fits"),
-            None => "master-dark-unknown.fits".to_owned(),
-        };
-        files.push((name, master_dark(darks, group)?));
-    }
-    if let Some(noise) = &darks.noise_adu {
-        let mut header = header("NOISE", darks.frames.len());
-        header.text("BUNIT", "ADU", "");
-        header.history("Standard deviation of each pixel over frames of one exposure, pooled over the exposures");
-        let image = fits_image(Size::new(darks.width, darks.height), noise, &header)?;
-        files.push(("noise.fits".to_owned(), image));
-    }
-    files.push((
-        "hot-pixels.csv".to_owned(),
-        hot_pixels_table(darks)?.into_bytes(),
-    ));
-    Ok(files)
-}
-
-/// The master dark of one exposure as a FITS file.
-fn master_dark(darks: &Darks, group: &ExposureGroup) -> anyhow::Result<Vec<u8>> {
-    let mut header = header("DARK", group.frames);
-    if let Some(exposure_s) = group.exposure_s {
-        header.real("EXPTIME", exposure_s, "[s] exposure");
-    }
-    header.real("MEAN", group.level_adu, "[ADU] mean of the frames' means");
-    let noise = group.temporal_noise_adu.unwrap_or(f64::NAN);
-    header.real("NOISE", noise, "[ADU] of a pixel in one frame");
-    header.history(&format!(
-        "Mean of each pixel over {} frames, by starpipe darks {}",
-        group.frames,
-        env!("CARGO_PKG_VERSION")
-    ));
-    fits_image(Size::new(darks.width, darks.height), &group.means, &header)
-}
-
-/// The hot pixels as CSV, with a heading even if there are none.
-fn hot_pixels_table(darks: &Darks) -> anyhow::Result<String> {
-    let mut writer = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
-    writer.write_record(HotPixelRow::COLUMNS)?;
-    for hot in &darks.hot_pixels {
-        writer.serialize(HotPixelRow::from(hot))?;
-    }
-    finished(writer)
 }

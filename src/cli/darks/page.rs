@@ -1,6 +1,7 @@
 //! The page of dark frames.
 
-use super::{figure, hot_pixels_table};
+use super::figure;
+use super::files::hot_pixels_table;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page;
 use starpipe::base::format::counted;

@@ -5,6 +5,7 @@ mod darks;
 mod figures;
 mod page;
 mod plan;
+mod tables;
 
 pub(crate) use args::DefocusArgs;
 
@@ -12,14 +13,13 @@ use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
 use super::output::files::{make_directory, write_whole};
 use super::output::messages::report_warning;
-use super::output::rows::{csv_table, json_indented, json_line};
+use super::output::rows::{json_indented, json_line};
 use super::progress::bar;
 use starpipe::Interrupt;
 use starpipe::model::defocus::Lens;
-use starpipe::study::defocus::{Caller, DefocusReport, GridRow, Plan, StarStudy};
+use starpipe::study::defocus::{Caller, DefocusReport, Plan, StarStudy};
 use std::path::PathBuf;
-
-const UNMET: &str = "no radius meets a required error";
+use tables::{curve_table, grid_table};
 
 /// `starpipe defocus`
 pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> {
@@ -28,7 +28,10 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     let plan = plan::plan(arguments, &pool)?;
     let studies = run(&plan, &pool)?;
     let report = DefocusReport::new(&plan, &studies);
-    let warnings = too_sharp(&report);
+    let mut warnings = too_sharp(&report);
+    if !report.is_met() {
+        warnings.push("no radius meets a required error".to_owned());
+    }
     for warning in &warnings {
         report_warning(warning);
     }
@@ -55,7 +58,6 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     let exit = if report.is_met() {
         Exit::Success
     } else {
-        report_warning(UNMET);
         Exit::Unmet
     };
     Ok(Outcome { text, exit })
@@ -97,14 +99,6 @@ fn too_sharp(report: &DefocusReport) -> Vec<String> {
         )
     };
     too_sharp.map(warning).collect()
-}
-
-fn grid_table(studies: &[StarStudy]) -> anyhow::Result<String> {
-    csv_table(studies.iter().flat_map(GridRow::rows))
-}
-
-fn curve_table(report: &DefocusReport) -> anyhow::Result<String> {
-    csv_table(report.stars.iter().flat_map(|star| &star.curve))
 }
 
 /// Names and contents of the files for `--out`.

@@ -1,7 +1,8 @@
 //! The page of a study.
 
 use super::args::DefocusArgs;
-use super::{UNMET, curve_table, figures, plan};
+use super::tables::curve_table;
+use super::{figures, plan};
 use crate::cli::page::{figure, options, table};
 use starpipe::base::format::five_digits;
 use starpipe::report::page::{Fact, Page, PageFigure};
@@ -15,9 +16,6 @@ pub(super) fn of(
     mut notes: Vec<String>,
 ) -> anyhow::Result<Page> {
     let stars = &report.stars;
-    if !report.is_met() {
-        notes.insert(0, UNMET.to_owned());
-    }
     if let (
         [],
         [

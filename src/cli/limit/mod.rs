@@ -3,18 +3,17 @@
 mod args;
 mod figures;
 mod page;
+mod rows;
 
 pub(crate) use args::LimitArgs;
 
 use super::exit::{CommandError, Outcome};
 use super::options::format::Format;
 use super::output::files::{write_into, write_whole};
-use super::output::messages::report_warning;
 use super::output::overwrite::is_same_file;
 use super::output::rows::{csv_table, json_lines};
 use anyhow::Context;
 use starpipe::model::sensitivity::{PredictionRow, Scenario};
-use starpipe::sky::catalog::Catalog;
 use std::path::{Path, PathBuf};
 
 /// More sweeps than this are a mistake; a figure of them would be unreadable.
@@ -37,7 +36,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Outcome, CommandError> {
     let page_path = arguments
         .html
         .checked_path(&inputs, || page_path(arguments))?;
-    let rows = rows(arguments, &scenario)?;
+    let rows = rows::of(arguments, &scenario)?;
     let mut files = Vec::new();
     if let Some(plot) = &arguments.plot {
         let sweeps = arguments.sweep.iter().map(|sweep| &sweep.0);
@@ -75,30 +74,6 @@ fn check_plot(arguments: &LimitArgs) -> Result<(), CommandError> {
         ))),
         None => Ok(()),
     }
-}
-
-/// The prediction for the scenario, or for each value of the sweeps.
-fn rows(arguments: &LimitArgs, scenario: &Scenario) -> Result<Vec<PredictionRow>, CommandError> {
-    let preset = arguments.scenario.preset;
-    if arguments.sweep.is_empty() {
-        let row = PredictionRow::new(scenario, preset, Catalog::built_in())
-            .map_err(CommandError::usage)?;
-        return Ok(vec![row]);
-    }
-    let mut all = Vec::new();
-    for sweep in arguments.sweep.iter().map(|sweep| &sweep.0) {
-        let rows = PredictionRow::of_sweep(scenario, preset, sweep).map_err(CommandError::usage)?;
-        // Some parameters matter in one reading only, or for one detector only.
-        if PredictionRow::have_same_limits(&rows) {
-            report_warning(changes_nothing(sweep.parameter.name()));
-        }
-        all.extend(rows);
-    }
-    Ok(all)
-}
-
-fn changes_nothing(parameter: &str) -> String {
-    format!("{parameter} changes nothing: the limits are the same at each of its values")
 }
 
 /// Writes the eleven figures of the paper and a sheet of all of them.

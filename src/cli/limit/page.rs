@@ -1,7 +1,8 @@
 //! The page of a prediction, or of sweeps.
 
 use super::args::LimitArgs;
-use super::{changes_nothing, figures};
+use super::figures;
+use super::rows::changes_nothing;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, figure, options, table};
 use starpipe::base::format::five_digits;
