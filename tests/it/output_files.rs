@@ -58,7 +58,7 @@ fn an_overlay_is_of_the_kind_and_width_that_are_wanted() {
         command.args([
             "process",
             "--overlay-width",
-            "500",
+            "1000",
             "--overlay-format",
             format,
         ]);
@@ -78,7 +78,7 @@ fn an_overlay_is_of_the_kind_and_width_that_are_wanted() {
     assert_eq!(draw("svg", &more).status, 0);
     let svg = fs::read_to_string(out.join("orion.svg")).unwrap();
     for text in [
-        "width=\"500\"",
+        "width=\"1000\"",
         ">HD 37742 ",
         ">M 42<",
         ">0°<",
@@ -89,7 +89,7 @@ fn an_overlay_is_of_the_kind_and_width_that_are_wanted() {
     }
     assert_eq!(draw("jpg", &[]).status, 0);
     let picture = image::open(out.join("orion.jpg")).unwrap();
-    assert_eq!(picture.width(), 500);
+    assert_eq!(picture.width(), 1000);
     assert!(!out.join("orion.png").exists());
     // A directory of frames does not have them.
     fs::copy(orion(), out.join("frame.png")).unwrap();

@@ -11,7 +11,7 @@ const HORIZONTAL: Rgb = Rgb([150, 125, 105]);
 /// Size of the letters, in units of strokes.
 const LETTERS: f32 = 10.5;
 /// Lines between the frame's centre and its corner.
-const LINES: f64 = 2.5;
+const LINES: f64 = 2.0;
 /// Distances of lines along meridians, in degrees.
 const STEPS_DEG: [f64; 10] = [30.0, 15.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.25, 0.1, 0.05];
 /// Distances of meridians of right ascension, in degrees: 2 h, 1 h, 30, 20, 10, 5, 2, 1 and half a minute.
