@@ -57,7 +57,7 @@ pub(crate) enum Command {
     /// Show the progress of an archive run, merge its tables, and report each night
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)
-    Identify(IdentifyArgs),
+    Identify(Box<IdentifyArgs>),
     /// Follow the attitude of a camera from frame to frame
     Track(Box<TrackArgs>),
     /// Measure the lens of a camera in several of its frames
