@@ -82,6 +82,17 @@ pub struct Column<R> {
     pub meaning: Meaning,
 }
 
+/// Characters of the longest text of each column.
+pub(crate) fn widths<R>(columns: &[Column<R>], rows: &[R]) -> Vec<usize> {
+    let width = |column: &Column<R>| {
+        let texts = rows
+            .iter()
+            .filter_map(|row| (column.value)(row).into_text());
+        texts.map(|text| text.chars().count()).max().unwrap_or(0)
+    };
+    columns.iter().map(width).collect()
+}
+
 /// A type of the fields of rows.
 pub trait Field {
     /// Whether there may be no value.

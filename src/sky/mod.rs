@@ -8,6 +8,7 @@
 //! - [`solar_system`]: date and site → the Moon and the planets.
 
 pub mod catalog;
+#[cfg(feature = "overlay")]
 pub(crate) mod objects;
 pub mod observer;
 pub mod places;

@@ -3,8 +3,7 @@
 //! # Reference
 //! FITS Standard 4.0 (2018), sect. 7.3.
 
-use super::widths;
-use crate::base::table::{Column, FieldValue};
+use crate::base::table::{Column, FieldValue, widths};
 use crate::frame::{FitsHeader, TABLE_CREATOR};
 
 const BLOCK_BYTES: usize = 2880;

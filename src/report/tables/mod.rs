@@ -12,7 +12,6 @@ mod fits_table;
 pub mod votable;
 
 use super::{FrameReport, StarRow};
-use crate::base::table::Column;
 use crate::pipeline::Solution;
 
 /// The kind of a table.
@@ -63,17 +62,6 @@ pub fn is_text_table(head: &[u8]) -> bool {
     [votable::MARK, ecsv::MARK]
         .iter()
         .any(|mark| memchr::memmem::find(head, mark.as_bytes()).is_some())
-}
-
-/// Characters of the longest text of each column.
-fn widths<R>(columns: &[Column<R>], rows: &[R]) -> Vec<usize> {
-    let width = |column: &Column<R>| {
-        let texts = rows
-            .iter()
-            .filter_map(|row| (column.value)(row).into_text());
-        texts.map(|text| text.chars().count()).max().unwrap_or(0)
-    };
-    columns.iter().map(width).collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Tables read back by hand; `scripts/check-outputs` reads them with astropy.
 
 use super::*;
-use crate::base::table::columns;
+use crate::base::table::{Column, columns};
 
 #[derive(Default)]
 struct Row {

@@ -3,9 +3,8 @@
 //! # Reference
 //! VOTable Format Definition 1.4, IVOA recommendation 2019.
 
-use super::widths;
 use crate::base::format::xml_escaped;
-use crate::base::table::{Column, FieldValue};
+use crate::base::table::{Column, FieldValue, widths};
 use std::fmt::Write as _;
 
 /// The mark of tables written by starpipe.
