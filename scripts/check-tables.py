@@ -25,7 +25,7 @@ def same(column, values):
             if not missing:
                 return False
         elif isinstance(value, list):
-            if str(found) != " ".join(value):
+            if ("" if is_masked else str(found).strip()) != " ".join(value):
                 return False
         elif isinstance(value, str):
             if str(found).strip() != value:
