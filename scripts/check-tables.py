@@ -11,9 +11,9 @@ import pathlib
 import sys
 
 import numpy as np
+from astropy.io import fits
 from astropy.table import Table
 from astropy.wcs import WCS
-from astropy.io import fits
 
 
 def same(column, values):
