@@ -2,93 +2,65 @@
 
 use clap::Command;
 
-/// The options that `-h` shows, by command; of commands that are not here, it shows all.
-const SHOWN: [(&str, &[&str]); 9] = [
-    (
-        "process",
-        &[
-            "dark",
-            "mask",
-            "fov",
-            "pixel_scale",
-            "near",
-            "date",
-            "site",
-            "camera",
-            "format",
-            "out",
-            "html",
-            "draw",
-            "quiet",
-            "catalog",
-            "threads",
-        ],
-    ),
-    (
-        "identify",
-        &[
-            "width",
-            "height",
-            "fov",
-            "pixel_scale",
-            "near",
-            "date",
-            "site",
-            "camera",
-            "format",
-            "out",
-            "html",
-            "quiet",
-            "catalog",
-            "threads",
-        ],
-    ),
+/// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
+/// shows all.
+const SHOWN: [(&str, [&[&str]; 2]); 10] = [
+    ("process", [&["dark", "mask", "draw"], &SOLVING]),
+    ("identify", [&["width", "height"], &SOLVING]),
     (
         "track",
-        &[
-            "interval",
-            "dark",
-            "fov",
-            "near",
-            "date",
-            "site",
-            "camera",
-            "max_stars",
-            "format",
-            "catalog",
-            "threads",
+        [
+            &["interval", "dark", "max_stars", "fov", "near", "catalog"],
+            &FRAMES,
         ],
     ),
     (
         "calibrate",
-        &[
-            "output",
-            "fov",
-            "date",
-            "site",
-            "camera",
-            "plot",
-            "opencv",
-            "platepar",
-            "indi_allsky",
-            "format",
-            "threads",
+        [
+            &["out", "fov", "plot", "opencv", "platepar", "indi_allsky"],
+            &FRAMES,
         ],
     ),
-    ("limit", &STUDY),
-    ("defocus", &STUDY),
-    ("simulate", &STUDY),
-    ("validate", &STUDY),
-    ("clutter", &STUDY),
+    (
+        "robustness",
+        [
+            &["count", "seed", "stars", "missing", "sweep", "plot"],
+            &["format", "threads"],
+        ],
+    ),
+    ("limit", [&[], &STUDY]),
+    ("defocus", [&[], &STUDY]),
+    ("simulate", [&[], &STUDY]),
+    ("validate", [&[], &STUDY]),
+    ("clutter", [&[], &STUDY]),
+];
+
+/// Those of commands that read frames.
+const FRAMES: [&str; 5] = ["date", "site", "camera", "format", "threads"];
+
+/// Those of commands that identify stars one frame after the other.
+const SOLVING: [&str; 12] = [
+    "date",
+    "site",
+    "camera",
+    "format",
+    "threads",
+    "fov",
+    "pixel_scale",
+    "near",
+    "out",
+    "html",
+    "quiet",
+    "catalog",
 ];
 
 /// Those of commands that are given a camera.
 const STUDY: [&str; 25] = [
     "camera",
     "preset",
-    "exposure",
+    "exposure_s",
     "sky_mag_arcsec2",
-    "zenith_distance",
+    "zenith_distance_deg",
     "sweep",
     "plot",
     "figures",
@@ -114,27 +86,53 @@ const STUDY: [&str; 25] = [
 /// The program with help on one screen for `-h`.
 pub(super) fn of(mut program: Command) -> Command {
     for (name, shown) in SHOWN {
-        program = program.mut_subcommand(name, |command| shortened(command, shown));
+        program = program.mut_subcommand(name, |command| with_options(command, &shown.concat()));
+    }
+    let names: Vec<String> = program
+        .get_subcommands()
+        .map(|c| c.get_name().to_owned())
+        .collect();
+    for name in names {
+        program = program.mut_subcommand(name, with_few_examples);
     }
     program
 }
 
-fn shortened(command: Command, shown: &[&str]) -> Command {
-    let examples = command.get_after_help().map(ToString::to_string);
-    let command = command.mut_args(|argument| {
+/// The command with these options alone, and the beginning of what is said of each.
+fn with_options(command: Command, shown: &[&str]) -> Command {
+    command.mut_args(|argument| {
         let is_shown = argument.is_positional() || shown.contains(&argument.get_id().as_str());
-        argument.hide_short_help(!is_shown)
-    });
-    let Some(examples) = examples else {
-        return command.after_help(MORE);
-    };
-    let first = examples.split("\n\n").next().unwrap_or_default().to_owned();
-    command
-        .after_help(format!("{first}\n\n{MORE}"))
-        .after_long_help(examples)
+        let argument = argument.hide_short_help(!is_shown);
+        match (
+            argument.get_help().map(ToString::to_string),
+            argument.get_long_help(),
+        ) {
+            (Some(help), None) => argument.help(beginning(&help).to_owned()).long_help(help),
+            _ => argument,
+        }
+    })
 }
 
-const MORE: &str = "--help shows all options.";
+/// What stands before the first aside.
+fn beginning(help: &str) -> &str {
+    let ends = ["; ", ": ", ". ", " ["].into_iter();
+    let end = ends.filter_map(|mark| help.find(mark)).min();
+    &help[..end.unwrap_or(help.len())]
+}
+
+/// The command with two examples, and without what is said after them.
+fn with_few_examples(command: Command) -> Command {
+    /// The heading and two examples.
+    const LINES: usize = 3;
+    let Some(all) = command.get_after_help().map(ToString::to_string) else {
+        return command;
+    };
+    let examples = all.split("\n\n").next().unwrap_or_default();
+    let first: Vec<&str> = examples.lines().take(LINES).collect();
+    command
+        .after_help(format!("{}\n\n--help shows all.", first.join("\n")))
+        .after_long_help(all)
+}
 
 #[cfg(test)]
 mod tests {
@@ -167,15 +165,21 @@ mod tests {
     #[test]
     fn every_option_that_is_shown_exists() {
         let program = Arguments::command();
-        for (name, shown) in SHOWN {
+        let mut of_no_study: Vec<&str> = STUDY.to_vec();
+        for (name, [own, shared]) in SHOWN {
             let command = program.find_subcommand(name).unwrap();
             let known: HashSet<&str> = command
                 .get_arguments()
                 .map(|a| a.get_id().as_str())
                 .collect();
-            let missing: Vec<_> = shown.iter().filter(|id| !known.contains(*id)).collect();
-            let is_study = shown.len() == STUDY.len();
-            assert!(missing.is_empty() || is_study, "{name}: {missing:?}");
+            if shared == STUDY {
+                of_no_study.retain(|id| !known.contains(id));
+                continue;
+            }
+            let shown = own.iter().chain(shared);
+            let missing: Vec<_> = shown.filter(|id| !known.contains(*id)).collect();
+            assert!(missing.is_empty(), "{name}: {missing:?}");
         }
+        assert!(of_no_study.is_empty(), "{of_no_study:?}");
     }
 }
