@@ -100,6 +100,15 @@ pub(crate) fn catalog(catalog: &Catalog) -> Fact {
     )
 }
 
+/// A note on how many frames have which note, if any has one.
+pub(crate) fn codes_note<'a>(codes: impl Iterator<Item = (&'a str, u64)>) -> Option<String> {
+    let counted: Vec<String> = codes
+        .map(|(code, frames)| format!("{code} {frames}"))
+        .collect();
+    let any = !counted.is_empty();
+    any.then(|| format!("Frames with a note, by its code: {}.", counted.join(", ")))
+}
+
 /// Frames that are read for small pictures: many may be gone, or no images.
 const MOST_TRIED: usize = 4 * Thumbnail::MOST;
 

@@ -68,7 +68,7 @@ pub use directory::{
     is_overlay, is_table,
 };
 pub use error::FrameError;
-pub(crate) use fits::write_rows;
+pub(crate) use fits::{BLOCK_BYTES, write_rows};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 pub use format::FrameFormat;
 pub use image::Frame;

@@ -9,7 +9,7 @@ use crate::calibration::Applied;
 use crate::detect::{Detection, DetectionFlags};
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
-use crate::identify::{FrameDate, Identification, SourceIndex};
+use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::sky::observer::{Observation, Site};
@@ -67,6 +67,18 @@ impl Solution {
     /// If `index` is of another solution and there is no such source.
     pub fn source(&self, index: SourceIndex) -> &Source {
         &self.sources[index.get()]
+    }
+
+    /// The star that each source is, in the order of the sources; none of those that are not identified.
+    pub(crate) fn matches_by_source(&self) -> Vec<Option<&StarMatch>> {
+        let mut matches = vec![None; self.sources.len()];
+        let identified = self.outcome.identification();
+        for star_match in identified.iter().flat_map(|found| &found.matches) {
+            if let Some(place) = matches.get_mut(star_match.source.get()) {
+                *place = Some(star_match);
+            }
+        }
+        matches
     }
 
     /// The positions of the identified stars, with the directions of their light.

@@ -2,7 +2,7 @@
 
 use super::nights::{NightLine, nights_text};
 use crate::cli::output::rows::csv_table;
-use crate::cli::page::{figure, options, table, thumbnails};
+use crate::cli::page::{codes_note, figure, options, table, thumbnails};
 use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
 use serde::Serialize;
 use serde_json::Value;
@@ -151,21 +151,12 @@ fn notes(
         let (frames, reason) = (counted(row.frames, "frame"), row.reason);
         notes.push(format!("{frames}: {code}. {}: {reason}", row.first_frame));
     }
-    let mut coded: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut coded: BTreeMap<&str, u64> = BTreeMap::new();
     for code in frames.iter().flat_map(|frame| frame.notes.split(',')) {
         *coded.entry(code).or_default() += 1;
     }
     coded.remove("");
-    if !coded.is_empty() {
-        let coded = coded
-            .iter()
-            .map(|(code, frames)| format!("{code} {frames}"));
-        let coded: Vec<_> = coded.collect();
-        notes.push(format!(
-            "Frames with a note, by its code: {}.",
-            coded.join(", ")
-        ));
-    }
+    notes.extend(codes_note(coded.into_iter()));
     Ok(notes)
 }
 

@@ -4,7 +4,7 @@ use super::figures;
 use super::frames::{FailedFrames, FrameRow, MOST_ROWS};
 use super::run::Run;
 use crate::cli::output::rows::csv_table;
-use crate::cli::page::{catalog, figure, options, table};
+use crate::cli::page::{catalog, codes_note, figure, options, table};
 use serde::Serialize;
 use starpipe::base::format::{counted, five_digits};
 use starpipe::report::page::{Fact, Page, PageTable};
@@ -54,29 +54,20 @@ pub(super) fn of_suite(
     rows: &[HardRow],
     failed: FailedFrames,
 ) -> anyhow::Result<Page> {
-    let [frames, right, wrong] = [
-        rows.iter().map(|row| row.frames).sum(),
-        rows.iter().map(|row| row.right).sum(),
-        rows.iter().map(|row| row.wrong).sum(),
-    ];
-    let nees = rows.iter().filter_map(|row| {
-        let off = nees_note(row.nees_mean?, row.nees_sigma?)?;
-        Some(format!("{}: {off}", row.case))
-    });
+    let case = |row: &HardRow| Trials {
+        name: row.case.to_string(),
+        counts: [row.frames, row.right, row.wrong],
+        nees: row.nees_mean.zip(row.nees_sigma),
+    };
+    let runs: Vec<Trials> = rows.iter().map(case).collect();
     let mut page = Page {
         title: format!("Hard cases for {camera}"),
         question: format!(
             "How often is a frame identified where lens, spot or detector are not what the pipeline assumes? {}.",
             counted(rows.len(), "case")
         ),
-        answer: rates([frames, right, wrong]),
-        notes: worst(
-            rows.iter()
-                .map(|row| (row.case, [row.frames, row.right, row.wrong])),
-        )
-        .into_iter()
-        .chain(nees)
-        .collect(),
+        answer: answer_of(&runs),
+        notes: doubts(&runs),
         text: HardRow::to_text(rows),
         tables: vec![table("Cases", &csv_table(rows.iter())?)?],
         ..Page::default()
@@ -91,27 +82,20 @@ pub(super) fn of_study(
     rows: &[StudyRow],
     failed: FailedFrames,
 ) -> anyhow::Result<Page> {
-    let [frames, right, wrong] = [
-        rows.iter().map(|row| row.frames).sum(),
-        rows.iter().map(|row| row.right).sum(),
-        rows.iter().map(|row| row.wrong).sum(),
-    ];
-    let name = |row: &StudyRow| format!("{} {}", row.parameter, five_digits(row.value));
-    let counts = rows
-        .iter()
-        .map(|row| (name(row), [row.frames, row.right, row.wrong]));
-    let nees = rows.iter().filter_map(|row| {
-        let off = nees_note(row.nees_mean?, row.nees_sigma?)?;
-        Some(format!("{}: {off}", name(row)))
-    });
+    let value = |row: &StudyRow| Trials {
+        name: format!("{} {}", row.parameter, five_digits(row.value)),
+        counts: [row.frames, row.right, row.wrong],
+        nees: row.nees_mean.zip(row.nees_sigma),
+    };
+    let runs: Vec<Trials> = rows.iter().map(value).collect();
     let mut page = Page {
         title: format!("Study of {camera}"),
         question: format!(
             "How do identification, limit and errors depend on a parameter? {}.",
             counted(rows.len(), "value")
         ),
-        answer: rates([frames, right, wrong]),
-        notes: worst(counts).into_iter().chain(nees).collect(),
+        answer: answer_of(&runs),
+        notes: doubts(&runs),
         text: StudyRow::to_text(rows),
         tables: vec![table("Values", &csv_table(rows.iter())?)?],
         ..Page::default()
@@ -160,14 +144,28 @@ fn rates([frames, right, wrong]: [usize; 3]) -> String {
     )
 }
 
-/// Notes on runs with wrong answers, and on the one with the fewest right ones.
-fn worst<N: std::fmt::Display>(runs: impl Iterator<Item = (N, [usize; 3])>) -> Vec<String> {
+/// The frames of a hard case, or of a value of a parameter.
+struct Trials {
+    name: String,
+    /// Of all frames, of right and of wrong ones.
+    counts: [usize; 3],
+    /// Mean and its standard error.
+    nees: Option<(f64, f64)>,
+}
+
+fn answer_of(runs: &[Trials]) -> String {
+    rates([0, 1, 2].map(|of| runs.iter().map(|run| run.counts[of]).sum()))
+}
+
+/// Notes on runs with wrong answers, on the one with the fewest right ones, and on errors that are stated
+/// wrongly.
+fn doubts(runs: &[Trials]) -> Vec<String> {
     let mut notes = Vec::new();
     let mut least: Option<(f64, String)> = None;
-    for (name, counts) in runs {
-        let [frames, right, wrong] = counts;
+    for Trials { name, counts, .. } in runs {
+        let [frames, right, wrong] = *counts;
         let share = right as f64 / frames.max(1) as f64;
-        let said = format!("{name}: {}", rates(counts));
+        let said = format!("{name}: {}", rates(*counts));
         if wrong > 0 {
             notes.push(said);
         } else if share < 1.0 && least.as_ref().is_none_or(|(found, _)| share < *found) {
@@ -175,6 +173,11 @@ fn worst<N: std::fmt::Display>(runs: impl Iterator<Item = (N, [usize; 3])>) -> V
         }
     }
     notes.extend(least.map(|(_, said)| format!("Fewest without a wrong answer: {said}")));
+    let nees = runs.iter().filter_map(|Trials { name, nees, .. }| {
+        let (mean, sigma) = (*nees)?;
+        Some(format!("{name}: {}", nees_note(mean, sigma)?))
+    });
+    notes.extend(nees);
     notes
 }
 
@@ -267,15 +270,7 @@ fn notes(summary: &Summary, rows: &[FrameRow]) -> Vec<String> {
     let attitude = summary.attitude.as_ref();
     notes.extend(attitude.and_then(|a| nees_note(a.nees_mean, a.nees_sigma)));
     let codes = summary.notes.iter();
-    let codes: Vec<String> = codes
-        .map(|(code, frames)| format!("{code} {frames}"))
-        .collect();
-    if !codes.is_empty() {
-        notes.push(format!(
-            "Frames with a note, by its code: {}.",
-            codes.join(", ")
-        ));
-    }
+    notes.extend(codes_note(codes.map(|(code, frames)| (&**code, *frames))));
     notes.extend(cut_note(rows.len()));
     notes
 }

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Headers and data are padded to a multiple of this.
-pub(super) const BLOCK_BYTES: usize = 2880;
+pub(crate) const BLOCK_BYTES: usize = 2880;
 const CARD_BYTES: usize = 80;
 const KEYWORD_BYTES: usize = 8;
 /// Maximum number of cards. A longer header is assumed to be damaged.

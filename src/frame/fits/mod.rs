@@ -31,6 +31,7 @@ mod unit;
 mod write;
 
 pub use cards::FitsHeader;
+pub(crate) use header::BLOCK_BYTES;
 pub(crate) use write::write_rows;
 pub use write::{FitsSamples, FitsWriteError, write_fits};
 

@@ -86,24 +86,18 @@ pub(super) fn marks(
     picture: &Picture,
     label: LabelKind,
 ) -> Vec<Mark> {
-    let mut catalog_star = vec![None; solution.sources.len()];
-    let identification = solution.outcome.identification();
-    for star_match in identification.iter().flat_map(|found| &found.matches) {
-        if let Some(star) = catalog_star.get_mut(star_match.source.get()) {
-            *star = Some(star_match.star);
-        }
-    }
     let rings = Rings::of(&solution.sources, picture);
     let is_body = |index: usize| {
         let mut bodies = solution.bodies.iter().filter_map(|body| body.source);
         bodies.any(|source| source.get() == index)
     };
-    let sources = solution.sources.iter().zip(catalog_star).enumerate();
+    let matches = solution.matches_by_source();
+    let sources = solution.sources.iter().zip(matches).enumerate();
     let stars = sources
         .filter(|(index, _)| !is_body(*index))
-        .map(|(_, (source, star))| {
+        .map(|(_, (source, star_match))| {
             let [x, y] = picture.position_of(&source.position);
-            let label = star.map(|index| StarLabel::of(catalog, index, label));
+            let label = star_match.map(|found| StarLabel::of(catalog, found.star, label));
             Mark {
                 x,
                 y,

@@ -1,7 +1,8 @@
 //! What the scripts of a page draw.
 
 use crate::base::format::to_decimals;
-use crate::pipeline::Solution;
+use crate::identify::StarMatch;
+use crate::pipeline::{Solution, Source};
 use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
 use serde::Serialize;
@@ -92,17 +93,12 @@ impl<'a> PageData<'a> {
 
 /// Observed minus predicted positions of the identified stars, in the order of the detections.
 fn offsets(solution: &Solution) -> Vec<Option<[f64; 2]>> {
-    let mut offsets = vec![None; solution.sources.len()];
-    let Some(found) = solution.outcome.identification() else {
-        return offsets;
+    let identified = solution.outcome.identification();
+    let offset = |(source, star_match): (&Source, Option<&StarMatch>)| {
+        let predicted = identified?.pixel_of(&star_match?.light)?;
+        let observed = source.position;
+        Some([observed.x - predicted.x, observed.y - predicted.y])
     };
-    for star_match in &found.matches {
-        let source = star_match.source.get();
-        let predicted = found.pixel_of(&star_match.light);
-        if let (Some(offset), Some(predicted)) = (offsets.get_mut(source), predicted) {
-            let observed = solution.sources[source].position;
-            *offset = Some([observed.x - predicted.x, observed.y - predicted.y]);
-        }
-    }
-    offsets
+    let matches = solution.matches_by_source();
+    solution.sources.iter().zip(matches).map(offset).collect()
 }

@@ -79,11 +79,12 @@ fn pairs(report: &FrameReport, solution: &Solution) -> Vec<Pair> {
     let Some(found) = solution.outcome.identification() else {
         return Vec::new();
     };
+    let matches = solution.matches_by_source();
     let pair = |(number, star): (usize, &StarReport)| {
         let id = star.id.as_ref()?;
         let (index_ra, index_dec) = star.ra_deg.zip(star.dec_deg)?;
         let source = &solution.sources.get(number)?.position;
-        let matched = found.matches.iter().find(|m| m.source.get() == number)?;
+        let matched = (*matches.get(number)?)?;
         let predicted = found.pixel_of(&matched.light)?;
         let [field_x, field_y] = report.file_pixel(source);
         let [index_x, index_y] = report.file_pixel(&predicted);

@@ -4,9 +4,8 @@
 //! FITS Standard 4.0 (2018), sect. 7.3.
 
 use crate::base::table::{Column, FieldValue, widths};
-use crate::frame::{FitsHeader, TABLE_CREATOR};
+use crate::frame::{BLOCK_BYTES, FitsHeader, TABLE_CREATOR};
 
-const BLOCK_BYTES: usize = 2880;
 /// Stands for a missing whole number.
 const NO_INTEGER: i64 = i64::MIN;
 

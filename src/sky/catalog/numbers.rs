@@ -4,15 +4,84 @@
 //! HD, SAO and HR numbers are SKY2000's own. Hipparcos numbers are those of van Leeuwen 2007
 //! (CDS I/311), matched by position. `catalogs/README.md` describes the file.
 
+use super::compact::ByteReader;
 use super::id::{HipparcosId, StarId};
 use std::sync::OnceLock;
 
-/// Ordered by Skymap number; read where it lies.
-const TABLE: &[u8] = include_bytes!("../../../catalogs/star-numbers.bin");
-const HEADER_BYTES: usize = 16;
-/// Bytes of the numbers of one star: Skymap, HD, SAO, Hipparcos.
-const WIDTHS: [usize; 4] = [4, 3, 3, 3];
-const HR_BYTES: usize = 2;
+const FILE: &[u8] = include_bytes!("../../../catalogs/star-numbers.bin");
+const MAGIC_BYTES: usize = 8;
+
+/// The columns of the file, which are read where they lie; a number of 0 is none.
+struct Numbers {
+    /// Ascending.
+    skymap: &'static [[u8; 4]],
+    hd: &'static [[u8; 3]],
+    sao: &'static [[u8; 3]],
+    hip: &'static [[u8; 3]],
+    /// Rows of the few stars with an HR number, ascending.
+    hr_row: &'static [[u8; 4]],
+    hr: &'static [[u8; 2]],
+}
+
+impl Numbers {
+    fn open() -> Self {
+        let mut file = ByteReader {
+            bytes: FILE,
+            at: MAGIC_BYTES,
+        };
+        let [stars, listed] = [(); 2].map(|()| u32::from_le_bytes(file.take()) as usize);
+        Self {
+            skymap: file.column(stars),
+            hd: file.column(stars),
+            sao: file.column(stars),
+            hip: file.column(stars),
+            hr_row: file.column(listed),
+            hr: file.column(listed),
+        }
+    }
+
+    fn row_of_skymap(&self, skymap: u32) -> Option<usize> {
+        self.skymap
+            .binary_search_by_key(&skymap, little_endian)
+            .ok()
+    }
+
+    /// The entry of a component of a double star is that of the whole.
+    fn row_of_hipparcos(&self, id: HipparcosId) -> Option<usize> {
+        static ROWS: OnceLock<Vec<(u32, usize)>> = OnceLock::new();
+        let rows = ROWS.get_or_init(|| {
+            let hip_and_row = |(row, hip)| Some((number(hip)?, row));
+            let mut rows: Vec<_> = self
+                .hip
+                .iter()
+                .enumerate()
+                .filter_map(hip_and_row)
+                .collect();
+            rows.sort_unstable();
+            rows
+        });
+        let found = rows
+            .binary_search_by_key(&id.number(), |(hip, _)| *hip)
+            .ok()?;
+        Some(rows[found].1)
+    }
+
+    fn hr(&self, row: usize) -> Option<u32> {
+        let row = u32::try_from(row).ok()?;
+        let found = self.hr_row.binary_search_by_key(&row, little_endian).ok()?;
+        number(&self.hr[found])
+    }
+}
+
+fn little_endian<const N: usize>(bytes: &[u8; N]) -> u32 {
+    let high_first = bytes.iter().rev();
+    high_first.fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+fn number<const N: usize>(bytes: &[u8; N]) -> Option<u32> {
+    let value = little_endian(bytes);
+    (value != 0).then_some(value)
+}
 
 /// The numbers of a star in catalogues that people look it up in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,84 +100,19 @@ pub struct StarNumbers {
 impl StarNumbers {
     /// The numbers of the star with a Skymap or Hipparcos number; none of any other star.
     pub(super) fn of(id: StarId) -> Self {
+        let numbers = Numbers::open();
         let row = match id {
-            StarId::Skymap(skymap) => row_of_skymap(skymap),
-            StarId::Hipparcos(hipparcos) => row_of_hipparcos(hipparcos),
+            StarId::Skymap(skymap) => numbers.row_of_skymap(skymap),
+            StarId::Hipparcos(hipparcos) => numbers.row_of_hipparcos(hipparcos),
             _ => None,
         };
         row.map_or(Self::default(), |row| Self {
-            hd: number(1, row),
-            sao: number(2, row),
-            hip: number(3, row),
-            hr: hr(row),
+            hip: number(&numbers.hip[row]),
+            hd: number(&numbers.hd[row]),
+            hr: numbers.hr(row),
+            sao: number(&numbers.sao[row]),
         })
     }
-}
-
-/// A count of the header.
-fn count(at: usize) -> usize {
-    little_endian(&TABLE[at..at + 4]) as usize
-}
-
-fn little_endian(bytes: &[u8]) -> u32 {
-    let high_first = bytes.iter().rev();
-    high_first.fold(0, |value, byte| value << 8 | u32::from(*byte))
-}
-
-/// The number of a star in a column; 0 is none.
-fn number(column: usize, row: usize) -> Option<u32> {
-    let before: usize = WIDTHS[..column].iter().sum();
-    let at = HEADER_BYTES + before * count(8) + WIDTHS[column] * row;
-    let value = little_endian(&TABLE[at..at + WIDTHS[column]]);
-    (value != 0).then_some(value)
-}
-
-/// The first index below `len` at which `value` is at least `wanted`, if it is `wanted` there.
-fn search(len: usize, wanted: u32, value: impl Fn(usize) -> u32) -> Option<usize> {
-    let (mut low, mut high) = (0, len);
-    while low < high {
-        let middle = usize::midpoint(low, high);
-        if value(middle) < wanted {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    (low < len && value(low) == wanted).then_some(low)
-}
-
-fn row_of_skymap(skymap: u32) -> Option<usize> {
-    search(count(8), skymap, |row| number(0, row).unwrap_or(0))
-}
-
-/// The few stars with an HR number are listed by their row.
-fn hr(row: usize) -> Option<u32> {
-    let (rows_at, listed) = (
-        HEADER_BYTES + WIDTHS.iter().sum::<usize>() * count(8),
-        count(12),
-    );
-    let value = |at: usize, width: usize, index: usize| {
-        let start = at + width * index;
-        little_endian(&TABLE[start..start + width])
-    };
-    let row = u32::try_from(row).ok()?;
-    let found = search(listed, row, |index| value(rows_at, 4, index))?;
-    Some(value(rows_at + 4 * listed, HR_BYTES, found))
-}
-
-/// The entry of a component of a double star is that of the whole.
-fn row_of_hipparcos(id: HipparcosId) -> Option<usize> {
-    static ROWS: OnceLock<Vec<(u32, u32)>> = OnceLock::new();
-    let rows = ROWS.get_or_init(|| {
-        let hip_and_row = |row: usize| Some((number(3, row)?, u32::try_from(row).ok()?));
-        let mut rows: Vec<_> = (0..count(8)).filter_map(hip_and_row).collect();
-        rows.sort_unstable();
-        rows
-    });
-    let found = rows
-        .binary_search_by_key(&id.number(), |(hip, _)| *hip)
-        .ok()?;
-    Some(rows[found].1 as usize)
 }
 
 #[cfg(test)]
@@ -153,10 +157,11 @@ mod tests {
         let stars = Catalog::built_in().stars().iter();
         let mut skymap: Vec<u32> = stars.map(|star| star.id.to_raw().1 as u32).collect();
         skymap.sort_unstable();
-        let listed: Vec<u32> = (0..count(8)).filter_map(|row| number(0, row)).collect();
+        let numbers = Numbers::open();
+        let listed: Vec<u32> = numbers.skymap.iter().filter_map(number).collect();
         assert_eq!(skymap, listed);
-        let bytes = WIDTHS.iter().sum::<usize>() * count(8) + (4 + HR_BYTES) * count(12);
-        assert_eq!(TABLE.len(), HEADER_BYTES + bytes);
+        let bytes = 13 * numbers.skymap.len() + 6 * numbers.hr.len();
+        assert_eq!(FILE.len(), MAGIC_BYTES + 8 + bytes);
     }
 
     #[test]

@@ -43,6 +43,7 @@ mod reader;
 pub(super) use decode::decode;
 pub(super) use encode::encode;
 pub(super) use layout::{MAGIC, checksum_of};
+pub(super) use reader::ByteReader;
 
 #[cfg(test)]
 mod tests;

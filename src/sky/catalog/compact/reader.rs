@@ -3,17 +3,20 @@
 use crate::sky::catalog::error::{CompactError, quoted};
 
 /// Bytes with a reading position. Callers check the length first: reading past the end panics.
-pub(super) struct ByteReader<'a> {
-    pub(super) bytes: &'a [u8],
-    pub(super) at: usize,
+pub(in crate::sky::catalog) struct ByteReader<'a> {
+    pub(in crate::sky::catalog) bytes: &'a [u8],
+    pub(in crate::sky::catalog) at: usize,
 }
 
 impl<'a> ByteReader<'a> {
-    pub(super) fn take<const N: usize>(&mut self) -> [u8; N] {
+    pub(in crate::sky::catalog) fn take<const N: usize>(&mut self) -> [u8; N] {
         self.column(1)[0]
     }
 
-    pub(super) fn column<const N: usize>(&mut self, count: usize) -> &'a [[u8; N]] {
+    pub(in crate::sky::catalog) fn column<const N: usize>(
+        &mut self,
+        count: usize,
+    ) -> &'a [[u8; N]] {
         let start = self.at;
         self.at += N * count;
         self.bytes[start..self.at].as_chunks().0
