@@ -107,7 +107,8 @@ pub struct Distortion {
     radius_px: f64,
     /// One per term of the model, then zeros.
     coefficients_px: [f64; MAX_TERMS],
-    /// Ideal distance from the axis, squared and in units of R, at which the image folds.
+    /// Ideal distance from the axis, squared and in units of R, at which the image folds, or beyond which
+    /// monomials tell nothing.
     fold_sq: f64,
 }
 
@@ -129,6 +130,9 @@ const INVERTED: f64 = 1e-9;
 /// Squared distance from the axis, in units of R, up to which folds are looked for. All of a frame is
 /// nearer than this.
 const FAR_SQ: f64 = 16.0;
+/// Monomials are those of the frame: this far from the axis, over the farthest place that the frame can
+/// have, they would image what is outside of it inside.
+const BEYOND_FRAME: f64 = 1.5;
 
 impl Distortion {
     /// Makes a distortion with one coefficient in pixels per term of `model`. Offsets are divided
@@ -141,11 +145,18 @@ impl Distortion {
         let mut padded = [0.0; MAX_TERMS];
         padded[..model.terms()].copy_from_slice(coefficients_px);
         let radial = [0, 1, 2].map(|term: usize| padded[term] / radius_px);
+        let fold_sq = fold_sq(radial);
+        let fold_sq = if model >= DistortionModel::Irregular3 {
+            let axis = [padded[AXIS], padded[AXIS + 1]].map(|along| along / radius_px);
+            fold_sq.min((BEYOND_FRAME * (1.0 + libm::hypot(axis[0], axis[1]))).powi(2))
+        } else {
+            fold_sq
+        };
         Self {
             model,
             radius_px,
             coefficients_px: padded,
-            fold_sq: fold_sq(radial),
+            fold_sq,
         }
     }
 
@@ -568,6 +579,22 @@ mod tests {
         assert_eq!(distortion.apply([183.0, 0.0]), None);
         assert!(distortion.remove([0.0, 121.0]).is_some());
         assert_eq!(distortion.remove([0.0, 122.0]), None);
+    }
+
+    #[test]
+    fn monomials_image_nothing_from_far_outside_the_frame() {
+        let mut coefficients_px = [0.0; DistortionModel::Irregular5.terms()];
+        coefficients_px[LENS_TERMS + 28] = -12.0;
+        let distortion = Distortion::new(DistortionModel::Irregular5, RADIUS_PX, &coefficients_px);
+        for step in 0..80 {
+            let radius_px = RADIUS_PX * (1.0 + 0.05 * f64::from(step));
+            for direction in 0..60 {
+                let (sin, cos) = (0.105 * f64::from(direction)).sin_cos();
+                if let Some([x, y]) = distortion.apply([radius_px * cos, radius_px * sin]) {
+                    assert!(x.hypot(y) > 0.95 * RADIUS_PX, "{radius_px}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -64,7 +64,7 @@ pub(super) fn identify_stars(
 
 /// Identifies a frame with these places. Where that fails, shows stars through the ground, or explains them
 /// badly, the time or the site may be wrong, and refraction with it: then also without air, and the answer
-/// with more stars counts. Also returns the places that it was found with.
+/// that is less likely by chance counts. Also returns the places that it was found with.
 pub(super) fn through_air_or_not(
     places: StarPlaces,
     mut identify: impl FnMut(StarPlaces) -> Outcome,
@@ -79,9 +79,14 @@ pub(super) fn through_air_or_not(
         let boresight = found.icrs_to_camera.boresight();
         !places.is_below_horizon(&boresight)
     };
-    let stars = |found: &Identification| found.matches.len();
-    let in_air = outcome.identification().filter(is_above).map(stars);
-    if in_air > without.identification().map(stars) {
+    let chance = |found: &Identification| found.log10_false_alarm;
+    let in_air = outcome.identification().filter(is_above).map(chance);
+    let without_air = without.identification().map(chance);
+    let is_better = match (in_air, without_air) {
+        (Some(in_air), Some(without_air)) => in_air <= without_air,
+        (in_air, _) => in_air.is_some(),
+    };
+    if is_better {
         (outcome, places)
     } else {
         (without, airless)

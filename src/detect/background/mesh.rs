@@ -216,6 +216,26 @@ impl Mesh {
         })
     }
 
+    /// Whether the background bends near a place by more than `sigmas` times the noise of a pixel.
+    pub fn is_bent_at(&self, x: f32, y: f32, sigmas: f32) -> bool {
+        let CellGrid { columns, rows, .. } = self.grid;
+        let at = self.grid.cell_at(
+            (x.max(0.0) as usize).min(self.grid.width_px - 1),
+            (y.max(0.0) as usize).min(self.grid.height_px - 1),
+        );
+        let inner = |at: usize, count: usize| at.max(2) - 1..(at + 2).min(count.saturating_sub(1));
+        let (row, column) = (at / columns, at % columns);
+        let bends = |cell: usize, step: usize| {
+            let [before, here, after] =
+                [cell - step, cell, cell + step].map(|at| self.background[at]);
+            (before - 2.0 * here + after).abs() > sigmas * self.sigma[cell]
+        };
+        let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+        near(row, rows).any(|y| inner(column, columns).any(|x| bends(y * columns + x, 1)))
+            || inner(row, rows)
+                .any(|y| near(column, columns).any(|x| bends(y * columns + x, columns)))
+    }
+
     /// The column of pixels at the centre of a column of cells.
     fn center(&self, column: usize) -> f32 {
         (column as f32 + 0.5) * self.cell_width_px - 0.5

@@ -1,5 +1,6 @@
 //! The frame with its background, noise and spot, and the windows that fits cut out of it.
 
+use super::background_plane::BackgroundPlane;
 use super::parameters::SpotEstimate;
 use super::window::{Window, window_radius};
 use crate::detect::background::Mesh;
@@ -110,16 +111,9 @@ impl FrameMaps<'_> {
         self.fill(window);
     }
 
-    /// Fills the window with its pixels, less a plane through the background map.
+    /// Fills the window with its pixels, less a plane through the background.
     fn fill(&self, window: &mut Window) {
-        let background = |x: usize, y: usize| self.background.at(x as f32, y as f32).0;
-        let (x0, y0) = (window.x0, window.y0);
-        let corner = background(x0, y0);
-        let plane = BackgroundPlane {
-            corner,
-            across: (background(x0 + window.width, y0) - corner) / window.width.max(1) as f32,
-            down: (background(x0, y0 + window.height) - corner) / window.height.max(1) as f32,
-        };
+        let plane = BackgroundPlane::in_window(&self.view, self.background, window);
         copy_above(&self.view, plane, self.saturation_adu, window);
     }
 }
@@ -136,17 +130,6 @@ fn union_of(spans: impl Iterator<Item = [usize; 2]>) -> (usize, usize) {
     let union = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let [first, end] = union.unwrap_or_default();
     (first, end.saturating_sub(first).min(MAX_WINDOW_PX))
-}
-
-/// The background in a window: a plane.
-#[derive(Debug, Clone, Copy)]
-struct BackgroundPlane {
-    /// Background in the first pixel, in ADU.
-    corner: f32,
-    /// Increase from column to column, in ADU.
-    across: f32,
-    /// Increase from row to row, in ADU.
-    down: f32,
 }
 
 /// Copies the pixels of a window above the background, in units of the noise; NaN where saturated.

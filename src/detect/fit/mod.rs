@@ -12,6 +12,7 @@
 //! # Reference
 //! Mighell 2005, doi 10.1111/j.1365-2966.2005.09208.x, for PSF fitting and its error budget.
 
+mod background_plane;
 mod batch;
 mod buffers;
 mod fitter;
