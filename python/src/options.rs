@@ -35,6 +35,7 @@ pub struct Options {
     effort: String,
     refine_lens: bool,
     attitude_only: bool,
+    sky: bool,
     time_limit_s: Option<f64>,
 }
 
@@ -65,6 +66,7 @@ impl Options {
         options.effort = effort(&self.effort)?;
         options.refine_lens = self.refine_lens;
         options.attitude_only = self.attitude_only;
+        options.sky = self.sky;
         options.time_limit_s = self.time_limit_s;
         if let Some(false_alarms) = self.false_alarms_per_mpx {
             options.false_alarms_per_mpx = false_alarms;

@@ -82,6 +82,8 @@ class SolveOptions(TypedDict, total=False):
         Fit the lens to each frame, although the camera's description has one that was measured.
     attitude_only : bool
         Stop at the attitude: no star beyond the brightest is named.
+    sky : bool
+        Measure the sky at each place: `Result.sky`.
     time_limit : Quantity or float
         How long a frame may take, in seconds. By default as long as it needs.
     """
@@ -107,6 +109,7 @@ class SolveOptions(TypedDict, total=False):
     effort: Literal["fast", "normal", "thorough"]
     refine_lens: bool
     attitude_only: bool
+    sky: bool
     time_limit: Quantity | float | None
 
 
@@ -134,6 +137,7 @@ def solve_options(
     effort: Any = "normal",
     refine_lens: bool = False,
     attitude_only: bool = False,
+    sky: bool = False,
     time_limit: Any = None,
 ) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
@@ -164,6 +168,7 @@ def solve_options(
         "effort": str(effort),
         "refine_lens": bool(refine_lens),
         "attitude_only": bool(attitude_only),
+        "sky": bool(sky),
         "time_limit_s": positive(time_limit, "s", "time_limit"),
     }
 

@@ -220,6 +220,11 @@ class Result(Attitude):
         return self._report["prediction"]  # type: ignore[no-any-return]
 
     @property
+    def sky(self) -> dict[str, Any] | None:
+        """The sky at each place, with ``sky=True``: the `sky` of the JSON, magnitudes in V."""
+        return self._report.get("sky")  # type: ignore[no-any-return]
+
+    @property
     def timing(self) -> dict[str, float]:
         """Run time of each stage, in milliseconds."""
         return self._report["timing_ms"]  # type: ignore[no-any-return]

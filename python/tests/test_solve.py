@@ -139,6 +139,13 @@ def test_attitude_only_names_few(pipeline, pixels, result):
     assert 4 <= named[0] <= named[1]
 
 
+def test_the_sky_is_measured_on_demand(pipeline, pixels, result):
+    assert result.sky is None
+    sky = pipeline.solve(pixels, sky=True).sky
+    assert sky["no_brightness"] == "bias_unknown" and len(sky["cells"]) > 20
+    assert 0.0 <= sky["cloud_share"] <= 1.0
+
+
 def test_a_camera_predicts_the_limit(frame):
     camera = frame.parent / "camera.toml"
     pipeline = sp.Pipeline(camera=camera)

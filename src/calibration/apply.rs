@@ -111,6 +111,11 @@ impl Calibration {
         Self { mask, ..self }
     }
 
+    /// Whether a dark is subtracted from frames.
+    pub fn has_dark(&self) -> bool {
+        self.dark.is_some()
+    }
+
     /// Whether frames are divided by a flat.
     pub fn has_flat(&self) -> bool {
         self.flat.is_some()

@@ -54,6 +54,15 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
     Process(Box<ProcessArgs>),
+    /// Measure the sky in frames: brightness, extinction, clouds, and how faint stars go at each place
+    #[command(after_help = "Examples:\n  \
+        starpipe sky --site 52.22,4.42 --dark master-dark.fits night.fits\n  \
+        starpipe sky --site 52.22,4.42 --camera camera.toml --format json night.fits > sky.jsonl\n\n\
+        The options are those of `starpipe process`, and the report is the same with the sky added; --out also\n\
+        writes FRAME.sky.svg. With site and time the sky of a wide field is divided by altitude and azimuth,\n\
+        else by columns and rows of the frame. The brightness needs the level of a pixel without light: --dark\n\
+        or --camera.")]
+    Sky(Box<ProcessArgs>),
     /// Show the progress of an archive run, merge its tables, and report each night
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)

@@ -75,6 +75,10 @@ pub(crate) fn run() -> ExitCode {
 fn run_command(command: Command) -> Result<Outcome, CommandError> {
     match command {
         Command::Process(arguments) => process::process(*arguments),
+        Command::Sky(mut arguments) => {
+            arguments.sky = true;
+            process::process(*arguments)
+        }
         Command::Identify(arguments) => identify::identify(*arguments),
         Command::Archive(arguments) => archive::archive(&arguments),
         Command::Track(arguments) => track::track(&arguments),

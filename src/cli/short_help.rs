@@ -4,8 +4,9 @@ use clap::Command;
 
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
-const SHOWN: [(&str, [&[&str]; 2]); 10] = [
+const SHOWN: [(&str, [&[&str]; 2]); 11] = [
     ("process", [&["dark", "mask", "draw"], &SOLVING]),
+    ("sky", [&["dark", "flat", "mask"], &SOLVING]),
     ("identify", [&["width", "height"], &SOLVING]),
     (
         "track",

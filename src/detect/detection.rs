@@ -1,5 +1,6 @@
 //! The sources of a frame, as detection reports them.
 
+use super::flux_limits::FluxLimits;
 use super::sky_area::SkyArea;
 use crate::base::coords::PixelPoint;
 use std::cmp::Ordering;
@@ -99,6 +100,8 @@ pub struct Detections {
     /// Whether fainter sources were left out, since there are more than
     /// [`DetectConfig::max_detections`](super::DetectConfig::max_detections).
     pub is_truncated: bool,
+    /// How bright a star must be to be detected, by place.
+    pub(crate) flux_limits: FluxLimits,
     /// The part of the frame that shows the sky; `None` where all of it does, or where it was not looked
     /// at.
     pub sky_area: Option<SkyArea>,
@@ -117,12 +120,15 @@ impl Detections {
         self.sky_area.as_ref().is_none_or(|area| area.shows(place))
     }
 
-    /// Removes what was found before; the list keeps its memory.
+    /// Removes what was found before; the lists keep their memory.
     pub(super) fn clear(&mut self) {
         let mut sources = std::mem::take(&mut self.sources);
+        let mut flux_limits = std::mem::take(&mut self.flux_limits);
         sources.clear();
+        flux_limits.clear();
         *self = Self {
             sources,
+            flux_limits,
             ..Self::default()
         };
     }

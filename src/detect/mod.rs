@@ -43,6 +43,7 @@ mod error;
 mod filter;
 mod filter_model;
 mod fit;
+mod flux_limits;
 mod measure;
 mod pixels;
 mod psf;
@@ -171,6 +172,10 @@ fn run(
     };
     let searched = search.run(&input)?;
     set_levels(found, background, &searched);
+    let filtered = &search.filtered.mesh;
+    found
+        .flux_limits
+        .set(&view, &background.mesh, filtered, &searched.pass);
     if !measure_trails(&input, search, &searched, found)? {
         measure_spots(&input, search, searched, measure, found)?;
     }

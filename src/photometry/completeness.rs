@@ -24,7 +24,7 @@
 //! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys.
 //! 63, 1293.
 
-use crate::base::statistics::{LnProduct, normal_cdf_and_density};
+use crate::base::statistics::{LnProduct, normal_cdf, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
 /// Centre of the prior of the width, in magnitudes.
@@ -87,6 +87,13 @@ pub struct Limit {
     pub width_mag: f64,
     /// The share λ of bright stars that is not detected.
     pub lost: f64,
+}
+
+impl Limit {
+    /// The probability that a star is detected.
+    pub(crate) fn probability(&self, v_mag: f64) -> f64 {
+        (1.0 - self.lost) * normal_cdf((self.v_mag - v_mag) / self.width_mag)
+    }
 }
 
 /// Why there is no limit.

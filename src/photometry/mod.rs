@@ -9,6 +9,7 @@
 //!    magnitude, at which half of the stars are detected. The faintest detected star is a poor
 //!    measure of the limit, because it owes its detection to noise.
 //! 4. [`comparison`] compares the results with the stated camera.
+//! 5. [`sky_map`] measures, on demand, the sky at each place of the frame.
 //!
 //! Caveats: an incomplete catalogue biases the completeness only if it lacks red stars or close
 //! pairs more than others. The limit is that of the frame's mean transparency, noise and star
@@ -19,6 +20,7 @@ mod association;
 pub mod comparison;
 pub mod completeness;
 mod identified_frame;
+pub mod sky_map;
 pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};

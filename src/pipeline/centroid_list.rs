@@ -250,6 +250,7 @@ pub fn solve_centroids(
         outcome,
         bodies,
         photometry: None,
+        sky: None,
         comparison: None,
         gain_e_per_adu: None,
         calibration: None,

@@ -35,6 +35,8 @@ pub struct Context<'a> {
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
     /// nothing is measured that needs the names.
     pub attitude_only: bool,
+    /// Whether to measure the sky at each place.
+    pub measure_sky: bool,
     /// Which directions reported attitudes refer to.
     pub attitude_frame: AttitudeFrame,
     /// A star is named where the odds are at least this many to 1 that the name is right, and at least
@@ -60,6 +62,7 @@ impl<'a> Context<'a> {
             lens: None,
             calibration: None,
             attitude_only: false,
+            measure_sky: false,
             attitude_frame: AttitudeFrame::default(),
             name_odds: NAME_ODDS,
             effort: Effort::Normal,

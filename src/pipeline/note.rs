@@ -117,6 +117,8 @@ pub enum Note {
     BrightDetectionsNotNamed(Vec<[f64; 2]>),
     /// Attitude and optics alone were wanted: the names are those of the brightest stars.
     AttitudeOnly,
+    /// The sky was to be measured, and too few stars tell the clear sky.
+    SkyNotMeasured,
     /// The residuals are larger than the centroid errors.
     LargeResiduals {
         /// Root mean square of the residuals, in pixels.
@@ -160,6 +162,7 @@ impl Note {
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
             Self::BrightDetectionsNotNamed(_) => "bright_detections_not_named",
             Self::AttitudeOnly => "attitude_only",
+            Self::SkyNotMeasured => "sky_not_measured",
             Self::LargeResiduals { .. } => "large_residuals",
         }
     }
@@ -180,6 +183,9 @@ impl Note {
             Self::AttitudeOnly => {
                 "attitude and optics are from the brightest stars; no other star was looked up, and no \
                  magnitude was measured"
+            }
+            Self::SkyNotMeasured => {
+                "the sky was not measured: too few stars are bright enough to tell how clear it is"
             }
             Self::NoExposure => {
                 "the exposure is not known, and so nothing is predicted of the camera"
@@ -342,7 +348,8 @@ impl fmt::Display for Note {
             | Self::NoDate
             | Self::NoTimeOfDay
             | Self::NoExposure
-            | Self::AttitudeOnly => f.write_str(self.fixed_text().unwrap_or_default()),
+            | Self::AttitudeOnly
+            | Self::SkyNotMeasured => f.write_str(self.fixed_text().unwrap_or_default()),
             Self::IgnoredHeader(value) => value.fmt(f),
             Self::LargestImage(choice) => choice.fmt(f),
             Self::Orientation(orientation) => write!(

@@ -77,6 +77,8 @@ pub struct SolveOptions {
     pub refine_lens: bool,
     /// Whether to stop at attitude and optics, from the brightest stars.
     pub attitude_only: bool,
+    /// Whether to measure the sky at each place: brightness, extinction, clouds and limits.
+    pub sky: bool,
     /// How long a frame may take.
     pub time_limit_s: Option<f64>,
 }
@@ -161,6 +163,7 @@ impl Default for SolveOptions {
             effort: Effort::Normal,
             refine_lens: false,
             attitude_only: false,
+            sky: false,
             time_limit_s: Some(DEFAULT_TIME_LIMIT_S),
         }
     }
@@ -202,6 +205,7 @@ impl<'a> Context<'a> {
             name_odds: options.name_odds,
             effort: options.effort,
             attitude_only: options.attitude_only,
+            measure_sky: options.sky,
             attitude_frame: options.attitude_frame,
             // A limit that is longer than any clock runs is none.
             time_limit: limit_s.and_then(|limit_s| Duration::try_from_secs_f64(limit_s).ok()),

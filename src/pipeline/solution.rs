@@ -12,6 +12,7 @@ use crate::identify::fit::MeasuredStar;
 use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
+use crate::photometry::sky_map::SkyMap;
 use crate::sky::observer::{Observation, Site};
 use crate::sky::places::AttitudeFrame;
 
@@ -50,6 +51,8 @@ pub struct Solution {
     pub bodies: Vec<BodyInFrame>,
     /// Zero point and limiting magnitude of an identified frame; a list of centroids has none.
     pub photometry: Option<FramePhotometry>,
+    /// The sky at each place of an identified frame, where it was wanted.
+    pub sky: Option<SkyMap>,
     /// Comparison with the stated camera, where there is one and the exposure is known.
     pub comparison: Option<Comparison>,
     /// Gain of the stated camera, in electrons per ADU.

@@ -252,11 +252,15 @@ fn solve(
         more_stars,
         defects: &prepared.defects,
         photometry: None,
+        sky: None,
     };
     let mut comparison = None;
     if !context.attitude_only {
         solved.measure_photometry();
         comparison = solved.compare_with_camera();
+        if context.measure_sky {
+            solved.measure_sky(comparison.as_ref());
+        }
     }
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
@@ -356,6 +360,7 @@ fn not_in_time(
         outcome: Outcome::NotIdentified(Reason::Search(SearchFailure::Interrupted)),
         bodies: Vec::new(),
         photometry: None,
+        sky: None,
         comparison: None,
         gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
         calibration: calibration.map(Calibration::applied),

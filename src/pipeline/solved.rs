@@ -16,6 +16,7 @@ use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
+use crate::photometry::sky_map::{self, Picture, SkyMap};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
@@ -46,6 +47,8 @@ pub(super) struct SolvedFrame<'a> {
     /// Columns that hold no light, and were left out.
     pub defects: &'a [DefectiveColumn],
     pub photometry: Option<FramePhotometry>,
+    /// The sky at each place.
+    pub sky: Option<SkyMap>,
     pub observation: Option<Observation>,
 }
 
@@ -55,14 +58,47 @@ impl SolvedFrame<'_> {
         let Some(identification) = self.outcome.identification() else {
             return;
         };
-        let frame = IdentifiedFrame {
+        let frame = self.identified_frame(identification);
+        self.photometry = Some(photometry::measure(&frame, self.context.indexed));
+    }
+
+    /// Measures the sky at each place of an identified frame, where it is wanted. `comparison` is with the
+    /// stated camera.
+    pub(super) fn measure_sky(&mut self, comparison: Option<&Comparison>) {
+        let Some(identification) = self.outcome.identification() else {
+            return;
+        };
+        let zero_point = self
+            .photometry
+            .as_ref()
+            .and_then(|measured| measured.zero_point.as_ref());
+        let camera = self.context.camera.as_ref().map(|camera| &camera.sheet);
+        let by_camera = camera
+            .zip(self.priors.exposure_s)
+            .map(|(sheet, exposure_s)| {
+                sheet.bias_adu + sheet.dark_current_e_s * exposure_s / sheet.gain_e_per_adu
+            });
+        let has_dark = self.calibration.is_some_and(Calibration::has_dark);
+        let has_flat = self.calibration.is_some_and(Calibration::has_flat);
+        let picture = Picture {
+            frame: self.frame,
+            dark_adu: if has_dark { Some(0.0) } else { by_camera },
+            linearity: zero_point.and_then(|zero_point| zero_point.linearity),
+            is_flat: has_flat || camera.is_some(),
+        };
+        let frame = self.identified_frame(identification);
+        let limit_vmag = comparison.map(|comparison| comparison.limit_vmag);
+        self.sky = sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag);
+    }
+
+    fn identified_frame<'f>(&'f self, identification: &'f Identification) -> IdentifiedFrame<'f> {
+        IdentifiedFrame {
             detections: &self.detections,
             identification,
             places: self.places,
             exposure_s: self.priors.exposure_s,
             vignetting: self.stated_vignetting(),
-        };
-        self.photometry = Some(photometry::measure(&frame, self.context.indexed));
+        }
     }
 
     /// Share of the light lost in the corners, by the camera's description; a flat removes it.
@@ -146,6 +182,7 @@ impl SolvedFrame<'_> {
             outcome: self.outcome,
             bodies: self.bodies,
             photometry: self.photometry,
+            sky: self.sky,
             comparison,
             gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
             calibration: self.calibration.map(Calibration::applied),
@@ -187,7 +224,13 @@ impl SolvedFrame<'_> {
             .chain(Note::of_pointing(!is_named, outcome))
             .chain(self.notes_of_bright_stars())
             .chain(Note::of_date(priors, outcome))
+            .chain(self.is_sky_missing().then_some(Note::SkyNotMeasured))
             .collect()
+    }
+
+    fn is_sky_missing(&self) -> bool {
+        let is_found = self.outcome.identification().is_some();
+        is_found && self.context.measure_sky && self.sky.is_none()
     }
 
     fn notes_of_bright_stars(&self) -> Vec<Note> {

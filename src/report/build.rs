@@ -10,6 +10,7 @@ use super::frame_report::{
     NoteReport, ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status,
     TimingReport,
 };
+use super::sky::SkyReport;
 use super::stars::{self, ReportedPointing};
 use super::{bodies, reason};
 use crate::base::coords::{Camera, Icrs, Rotation};
@@ -74,6 +75,7 @@ impl FrameReport {
             magnitude: None,
             photometry: solution.photometry.as_ref().map(photometry),
             prediction: None,
+            sky: solution.sky.as_ref().map(SkyReport::new),
             calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
             bodies: Vec::new(),

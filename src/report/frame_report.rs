@@ -1,5 +1,6 @@
 //! The report of a frame: its fields, as JSON has them.
 
+use super::sky::SkyReport;
 use crate::base::coords::PixelPoint;
 use crate::base::format::json_escaped;
 use crate::base::remedy::Remedy;
@@ -60,6 +61,9 @@ pub struct FrameReport {
     pub prediction: Option<PredictionReport>,
     /// The calibration that was applied, if any.
     pub calibration: Option<CalibrationReport>,
+    /// The sky at each place, where it was wanted (`starpipe sky`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<SkyReport>,
     /// The sky background.
     pub background: BackgroundReport,
     /// The Moon and the planets in the frame, where its date is known.

@@ -25,6 +25,8 @@ mod reason;
 pub mod regions;
 #[cfg(test)]
 mod sample;
+mod sky;
+pub mod sky_figure;
 mod star_row;
 mod stars;
 pub mod tables;
@@ -43,6 +45,8 @@ pub use frame_report::{
 };
 pub use frame_report::{FrameReport, SCHEMA};
 pub use lens::LensReport;
+#[doc(hidden)]
+pub use sky::{SkyCellReport, SkyReport, ZenithReport};
 #[doc(hidden)]
 pub use star_row::{StarRow, write_table_header};
 #[doc(hidden)]

@@ -14,6 +14,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         observation: None,
         site: None,
         photometry: None,
+        sky: None,
         comparison: None,
         gain_e_per_adu: None,
         calibration: None,

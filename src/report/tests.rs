@@ -60,6 +60,7 @@ fn unidentified() -> FrameReport {
         matched: None,
         magnitude: None,
         photometry: None,
+        sky: None,
         prediction: None,
         calibration: None,
         background: BackgroundReport {

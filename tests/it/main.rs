@@ -40,6 +40,7 @@ mod robustness;
 mod schema;
 mod simulate;
 mod simulate_files;
+mod sky;
 mod sky_area;
 mod solar_system;
 mod spots;

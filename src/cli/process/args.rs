@@ -33,6 +33,9 @@ use std::path::PathBuf;
     --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
     overwrites only such results. In directories of frames such results are skipped.")]
 pub(crate) struct ProcessArgs {
+    /// Whether the sky is measured: `starpipe sky`.
+    #[arg(skip)]
+    pub(crate) sky: bool,
     #[command(flatten)]
     pub(super) frames: FrameOptions,
     /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
@@ -139,6 +142,7 @@ impl ProcessArgs {
     /// All that is stated for the frames.
     fn options(&self) -> Result<SolveOptions, CommandError> {
         let mut options = self.solving.options()?;
+        options.sky = self.sky;
         options.exposure_s = self.exposure.exposure;
         options.zenith_distance_deg = self.exposure.zenith_distance;
         options.extinction_mag_per_airmass = self.exposure.extinction;

@@ -145,6 +145,7 @@ impl OutputOptions {
             (true, "json"),
             (true, "csv"),
             (true, "wcs"),
+            (true, "sky.svg"),
             (has_picture, self.overlay.options().format.extension()),
             (self.html, "html"),
             (self.write_fits, "solved.fits"),

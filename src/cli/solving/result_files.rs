@@ -9,7 +9,7 @@ use crate::cli::output::paths::output_path;
 use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
-use starpipe::report::{FrameReport, page, regions, tables, wcs, write_table_header};
+use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs, write_table_header};
 use starpipe::sky::catalog::Catalog;
 
 /// Writes result files into a directory, if one is given.
@@ -73,6 +73,8 @@ impl<'a> ResultFiles<'a> {
             let table = tables::stars(report, &solved.solution, format);
             files.push((path(format.extension()), table));
         }
+        let sky = sky_figure::svg(report);
+        files.extend(sky.map(|figure| (path("sky.svg"), figure.into_bytes())));
         if self.options.regions {
             files.push((path("reg"), regions::ds9(report).into_bytes()));
         }

@@ -65,6 +65,9 @@ pub struct Scene {
     pub trail_vmag: f64,
     /// Angular rate of a satellite, in degrees per second.
     pub trail_rate_deg_s: f64,
+    /// Whether air and airglow grow thicker towards the horizon, and the sky's light is that of each pixel's
+    /// solid angle: 1, or 0 for the same over the frame.
+    pub by_altitude: f64,
     /// Mean number of false stars on a frame.
     pub false_stars: f64,
     /// V magnitude of the faintest false star; the camera's limit by default.
@@ -105,6 +108,7 @@ impl Default for Scene {
             trails: 0.0,
             trail_vmag: 4.0,
             trail_rate_deg_s: 0.5,
+            by_altitude: 0.0,
             false_stars: 0.0,
             false_star_vmag: None,
             missing: 0.0,
@@ -281,6 +285,11 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         trail_rate_deg_s,
         Limits::Positive,
         "how fast it moves, in degrees a second"
+    ),
+    key!(
+        by_altitude,
+        Limits::FromTo(0.0, 1.0),
+        "1 for air and airglow that grow thicker towards the horizon, 0 for the same over the frame"
     ),
     key!(
         false_stars,

@@ -3,14 +3,15 @@
 use super::image::ElectronImage;
 use super::lights::{moon_direction, moon_vmag};
 use super::scene::Scene;
-use super::skyline::Skyline;
+use super::skyline::{Skyline, zenith_of};
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
 use crate::camera::data_sheet::lens_transmission;
 use crate::model::sensitivity::{REFERENCE_NM, Scenario};
-use crate::sky::observer::airmass::airmass_krisciunas_schaefer;
+use crate::sky::observer::airmass::{airmass_kasten_young, airmass_krisciunas_schaefer};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::FRAC_PI_2;
 
 /// Grid step on which moonlight is computed, in pixels. Clouds use a step of their size over
 /// 32, at most this. Values between grid points are interpolated.
@@ -27,6 +28,7 @@ pub(super) struct Sky<'a> {
     clouds: Option<Clouds>,
     moonlight: Option<Moonlight>,
     skyline: Option<Skyline>,
+    altitudes: Option<Altitudes>,
 }
 
 impl<'a> Sky<'a> {
@@ -50,6 +52,7 @@ impl<'a> Sky<'a> {
             clouds: (scene.cloud_mag > 0.0 || scene.cloud_light > 0.0).then_some(clouds),
             moonlight: Moonlight::new(scenario, scene, camera),
             skyline: Skyline::new(scenario, scene, camera, random.clone()),
+            altitudes: (scene.by_altitude > 0.0).then(|| Altitudes::new(scenario, camera)),
         }
     }
 
@@ -63,13 +66,20 @@ impl<'a> Sky<'a> {
             .clouds
             .as_ref()
             .map_or(1.0, |clouds| clouds.transmission(place));
-        clouds * self.lens(place)
+        let air = self
+            .altitudes
+            .as_ref()
+            .map_or(1.0, |altitudes| altitudes.transmission(place, self.camera));
+        clouds * air * self.lens(place)
     }
 
     /// Fills `image` with the sky, where `sky_e` is that of the uniform sky, in electrons.
     pub(super) fn expose(&self, image: &mut ElectronImage, sky_e: f64) {
         let is_pinhole = self.camera.is_pinhole();
-        let is_even = is_pinhole && self.vignetting == 0.0 && self.slope == [0.0; 2];
+        let is_even = is_pinhole
+            && self.vignetting == 0.0
+            && self.slope == [0.0; 2]
+            && self.altitudes.is_none();
         let is_open = self.clouds.is_none() && self.skyline.is_none();
         if is_even && is_open && self.moonlight.is_none() {
             return image.pixels_mut().fill(sky_e);
@@ -82,6 +92,10 @@ impl<'a> Sky<'a> {
         let clouds = clouds.map(|clouds| {
             let grid = CoarseGrid::of(image, clouds.grid_px(), |place| clouds.height(place));
             (clouds.light, grid)
+        });
+        let altitudes = self.altitudes.as_ref();
+        let glow = altitudes.map(|altitudes| {
+            CoarseGrid::of(image, GRID_PX, |place| altitudes.glow(place, self.camera))
         });
         let centre = self.camera.centre();
         for (y, row) in image.rows_mut() {
@@ -101,7 +115,8 @@ impl<'a> Sky<'a> {
                 let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
                     light * Clouds::thickness_of(grid.at(x, y))
                 });
-                let sky = gradient.max(0.0) * (1.0 + moon + cloud);
+                let glow = glow.as_ref().map_or(1.0, |grid| grid.at(x, y));
+                let sky = gradient.max(0.0) * glow * (1.0 + moon + cloud);
                 *pixel = sky_e * sky * self.lens(&place);
             }
         }
@@ -198,6 +213,75 @@ impl Clouds {
             -0.4 * self.extinction_mag * Self::thickness_of(self.height(place)),
         )
     }
+}
+
+/// Air and airglow by altitude.
+struct Altitudes {
+    zenith: UnitVector<Camera>,
+    /// Part of the light that one airmass transmits.
+    transmission: f64,
+    /// Airmass for which the scenario's light is.
+    airmass: f64,
+    /// Airglow, and the solid angle of a pixel, for which the scenario's sky is.
+    glow: f64,
+    solid_angle_sr: f64,
+}
+
+impl Altitudes {
+    fn new(scenario: &Scenario, camera: &CameraModel) -> Self {
+        let conditions = &scenario.conditions;
+        let zenith_rad = conditions.zenith_distance_deg.to_radians();
+        let transmission = conditions.extinction.zenith_transmission(REFERENCE_NM);
+        Self {
+            zenith: zenith_of(scenario),
+            transmission,
+            airmass: airmass_kasten_young(zenith_rad),
+            glow: Self::airglow(zenith_rad, transmission),
+            solid_angle_sr: solid_angle_sr(camera, &camera.axis()).unwrap_or(f64::NAN),
+        }
+    }
+
+    /// # Reference
+    /// Krisciunas & Schaefer 1991, PASP 103, 1033, eq. (2).
+    fn airglow(zenith_rad: f64, transmission: f64) -> f64 {
+        let airmass = airmass_krisciunas_schaefer(zenith_rad);
+        airmass * libm::pow(transmission, airmass - 1.0)
+    }
+
+    fn zenith_rad(&self, place: &PixelPoint, camera: &CameraModel) -> Option<f64> {
+        let zenith_rad = self.zenith.angle_to(&camera.direction_of(place)?);
+        Some(zenith_rad.min(FRAC_PI_2))
+    }
+
+    /// What the air transmits over what it does in the scenario's direction.
+    fn transmission(&self, place: &PixelPoint, camera: &CameraModel) -> f64 {
+        let airmass = self.zenith_rad(place, camera).map(airmass_kasten_young);
+        airmass.map_or(1.0, |airmass| {
+            libm::pow(self.transmission, airmass - self.airmass)
+        })
+    }
+
+    /// The sky's light in a pixel over that of the scenario.
+    fn glow(&self, place: &PixelPoint, camera: &CameraModel) -> f64 {
+        let glow = self
+            .zenith_rad(place, camera)
+            .map(|zenith_rad| Self::airglow(zenith_rad, self.transmission));
+        let seen = glow.zip(solid_angle_sr(camera, place));
+        seen.map_or(0.0, |(glow, solid_angle_sr)| {
+            glow / self.glow * solid_angle_sr / self.solid_angle_sr
+        })
+    }
+}
+
+/// The solid angle of a pixel: the triangle of three of its corners, twice.
+fn solid_angle_sr(camera: &CameraModel, place: &PixelPoint) -> Option<f64> {
+    let corner = |dx: f64, dy: f64| {
+        let place = PixelPoint::new(place.x + dx, place.y + dy);
+        Some(*camera.direction_of(&place)?.as_vector())
+    };
+    let first = corner(-0.5, -0.5)?;
+    let [right, down] = [corner(0.5, -0.5)? - first, corner(-0.5, 0.5)? - first];
+    Some(right.cross(&down).norm())
 }
 
 /// Moonlight scattered by the air.

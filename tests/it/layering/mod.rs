@@ -21,7 +21,9 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("model", &["base", "sky", "frame", "camera", "detect"]),
     (
         "photometry",
-        &["base", "sky", "camera", "detect", "identify", "model"],
+        &[
+            "base", "sky", "frame", "camera", "detect", "identify", "model",
+        ],
     ),
     (
         "pipeline",

@@ -1,0 +1,369 @@
+//! The brightness of the sky: the background above the level without light, over the solid angle of a
+//! pixel, on the zero point of the stars of the same frame.
+
+use super::clear_sky::ClearSky;
+use super::grid::Grid;
+use super::picture::Picture;
+use crate::base::coords::PixelPoint;
+use crate::base::statistics::Estimate;
+use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
+use crate::detect::BackgroundMap;
+use crate::photometry::{IdentifiedFrame, instrumental_mag};
+use std::f64::consts::PI;
+
+/// B−V of the sky between stars: 0.6 by moonlight, 0.9 to 1.0 without (Patat 2003, A&A 400, 1183).
+const SKY_BV_MAG: Estimate = Estimate {
+    value: 0.8,
+    sigma: 0.2,
+};
+/// Full width at half maximum of what a meter of the sky's brightness sees, in degrees.
+const METER_DEG: f64 = 20.0;
+/// How far from the zenith it sees, in degrees.
+const METER_REACH_DEG: f64 = 30.0;
+/// Side of the cells in which the background is measured, in pixels.
+const MESH_PX: usize = 64;
+
+/// Why no brightness was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum NoBrightness {
+    /// The level of a pixel without light is not known.
+    BiasUnknown,
+    /// Gray levels are not proportional to light.
+    NotLinear,
+}
+
+impl NoBrightness {
+    /// Its code in reports.
+    pub const fn code(self) -> &'static str {
+        match self {
+            Self::BiasUnknown => "bias_unknown",
+            Self::NotLinear => "not_linear",
+        }
+    }
+
+    /// What it means, and what would help.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::BiasUnknown => {
+                "the level of a pixel without light is not known; a dark frame or a description of the \
+                 camera tells it"
+            }
+            Self::NotLinear => "gray levels are not proportional to light, as in most JPEG files",
+        }
+    }
+}
+
+/// The brightness of a part of the sky, seen from the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SkyLight {
+    /// V magnitude of a square arcsecond.
+    pub mag_arcsec2: Estimate,
+    /// Luminance, in cd/m².
+    pub luminance_cd_m2: f64,
+}
+
+/// The brightness about the zenith, as a meter with a field of 20° sees it, and what follows from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ZenithSky {
+    /// The brightness.
+    pub light: SkyLight,
+    /// V magnitude of the faintest star that the unaided eye sees.
+    pub naked_eye_limit_vmag: f64,
+    /// Bortle's class, from 1 (excellent) to 9 (inner city).
+    pub bortle: u8,
+}
+
+/// Light and noise of a cell.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CellLevel {
+    /// Solid angle of the sky in it, in steradians.
+    pub solid_angle_sr: f64,
+    /// Noise of a pixel, in ADU.
+    pub noise_adu: f64,
+    /// Flux at which half of the stars are detected, in ADU.
+    pub limit_adu: f64,
+    /// Airmass, where the horizon is known.
+    pub airmass: Option<f64>,
+    /// Mean distance from the frame's centre over that of the edge of the field, squared.
+    pub off_centre_sq: f64,
+    light: Sum,
+}
+
+/// Light over solid angle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    /// Light of all samples, in ADU.
+    light_adu: f64,
+    /// Their solid angle in the lens's center, in steradians.
+    solid_angle_sr: f64,
+}
+
+/// Light and noise of all cells.
+pub(super) struct Levels {
+    /// Each of them.
+    pub cells: Vec<CellLevel>,
+    /// Flux of the noise of a pixel is over this time.
+    pub exposure_s: f64,
+    /// The light about the zenith, weighted as a meter sees it.
+    zenith: Sum,
+    /// Solid angle about the zenith in the frame, weighted in the same way.
+    zenith_sr: f64,
+}
+
+/// What the sums of a cell need.
+#[derive(Debug, Clone, Default)]
+struct CellSums {
+    samples: f64,
+    off_centre_sq: f64,
+    airmass: f64,
+    limit_adu: f64,
+    /// Differences of pixels two columns apart.
+    differences_adu: Vec<f32>,
+}
+
+impl Levels {
+    /// Measures them on samples of the frame.
+    pub(super) fn of(
+        frame: &IdentifiedFrame,
+        picture: &Picture,
+        grid: &Grid,
+        clear_sky: &ClearSky,
+    ) -> Self {
+        /// Places at which the light is measured.
+        const SAMPLES: f64 = 60_000.0;
+        let camera = grid.camera();
+        let (width, height) = (picture.frame.width, picture.frame.height);
+        let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
+        let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
+        let background = BackgroundMap::measure(picture.frame, MESH_PX);
+        let dark_adu = picture.dark_adu.unwrap_or(0.0);
+        let mut levels = Self {
+            cells: vec![CellLevel::default(); grid.places.len()],
+            exposure_s: frame.exposure_s.unwrap_or(1.0),
+            zenith: Sum::default(),
+            zenith_sr: 0.0,
+        };
+        let mut sums = vec![CellSums::default(); grid.places.len()];
+        let (mut row, mut background_row) = (vec![0.0_f32; width], vec![0.0; width]);
+        for y in (step / 2..height).step_by(step) {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = picture.frame.pixels.value(y * width + x);
+            }
+            background.row(y, &mut background_row);
+            for x in (step / 2..width).step_by(step) {
+                let pixel = PixelPoint::new(x as f64, y as f64);
+                let Some(direction) = grid.direction_of(&pixel) else {
+                    continue;
+                };
+                let cell = grid.cell_of(&pixel, &direction);
+                let Some(cell) = cell.filter(|_| frame.detections.shows_sky(&pixel)) else {
+                    continue;
+                };
+                let Some(pixel_sr) = solid_angle_sr(grid, &pixel) else {
+                    continue;
+                };
+                let airmass = frame.places.airmass(&direction);
+                let off_centre_sq = camera.off_centre_sq(&pixel) / edge_sq;
+                let light_adu = f64::from(background_row[x]) - dark_adu;
+                let seen_sr = pixel_sr * clear_sky.transmission(off_centre_sq);
+                let level = &mut levels.cells[cell];
+                level.solid_angle_sr += pixel_sr * (step * step) as f64;
+                level.light.add(1.0, light_adu, seen_sr);
+                let sum = &mut sums[cell];
+                sum.samples += 1.0;
+                sum.off_centre_sq += off_centre_sq;
+                sum.airmass += airmass.unwrap_or(f64::NAN);
+                let size_px = [camera.width_px, camera.height_px];
+                let limit_adu = frame.detections.flux_limits.at(&pixel, size_px);
+                sum.limit_adu += limit_adu.unwrap_or(f64::NAN);
+                let block = x - step / 2..(x + step / 2 + 1).min(width.saturating_sub(2));
+                let differences = block.map(|x| (row[x + 2] - row[x]).abs());
+                sum.differences_adu
+                    .extend(differences.filter(|d| !d.is_nan()));
+                if let Some(zenith) = frame.places.zenith() {
+                    let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
+                    levels.zenith.add(weight, light_adu, seen_sr);
+                    levels.zenith_sr += weight * pixel_sr * (step * step) as f64;
+                }
+            }
+        }
+        for (level, sum) in levels.cells.iter_mut().zip(sums) {
+            level.off_centre_sq = sum.off_centre_sq / sum.samples;
+            level.limit_adu = sum.limit_adu / sum.samples;
+            let airmass = sum.airmass / sum.samples;
+            level.airmass = Some(airmass).filter(|airmass| !airmass.is_nan());
+            level.noise_adu = noise_of(sum.differences_adu);
+        }
+        levels
+    }
+
+    /// The brightness of a cell; `None` where it has no light.
+    pub(super) fn light(&self, cell: usize, clear_sky: &ClearSky) -> Option<SkyLight> {
+        self.cells[cell]
+            .light
+            .brightness(self.exposure_s, clear_sky)
+    }
+
+    /// The brightness about the zenith; `None` where too little of it is in the frame.
+    pub(super) fn zenith(&self, clear_sky: &ClearSky) -> Option<ZenithSky> {
+        /// Share of what a meter would see that is in the frame at least.
+        const LEAST_SHARE: f64 = 0.9;
+        if self.zenith_sr < LEAST_SHARE * meter_solid_angle_sr() {
+            return None;
+        }
+        let light = self.zenith.brightness(self.exposure_s, clear_sky)?;
+        let mag = light.mag_arcsec2.value;
+        Some(ZenithSky {
+            light,
+            naked_eye_limit_vmag: naked_eye_limit_vmag(mag),
+            bortle: bortle(mag),
+        })
+    }
+}
+
+impl Sum {
+    fn add(&mut self, weight: f64, light_adu: f64, solid_angle_sr: f64) {
+        self.light_adu += weight * light_adu;
+        self.solid_angle_sr += weight * solid_angle_sr;
+    }
+
+    fn brightness(&self, exposure_s: f64, clear_sky: &ClearSky) -> Option<SkyLight> {
+        let square_arcsec = self.solid_angle_sr / RAD_PER_ARCSEC.powi(2);
+        let light = self.light_adu / square_arcsec / exposure_s;
+        if light.is_nan() || light <= 0.0 {
+            return None;
+        }
+        let zero_point = clear_sky.at_ground(SKY_BV_MAG.value);
+        let mag = zero_point.value + instrumental_mag(light);
+        let by_color_mag = clear_sky.color_term.value * SKY_BV_MAG.sigma;
+        Some(SkyLight {
+            mag_arcsec2: Estimate {
+                value: mag,
+                sigma: zero_point.sigma.hypot(by_color_mag),
+            },
+            luminance_cd_m2: luminance_cd_m2(mag),
+        })
+    }
+}
+
+/// Why the brightness of a frame cannot be measured.
+pub(super) fn refusal(picture: &Picture) -> Option<NoBrightness> {
+    /// Air and clouds make a slope, too, but a small one: tone curves make a large one.
+    const LARGEST_SLOPE: f64 = 0.1;
+    let has_tone_curve = picture
+        .linearity
+        .is_some_and(|linearity| (linearity.value - 1.0).abs() > LARGEST_SLOPE);
+    if has_tone_curve {
+        Some(NoBrightness::NotLinear)
+    } else if picture.dark_adu.is_none() {
+        Some(NoBrightness::BiasUnknown)
+    } else {
+        None
+    }
+}
+
+/// The solid angle of a pixel, in steradians.
+fn solid_angle_sr(grid: &Grid, pixel: &PixelPoint) -> Option<f64> {
+    let at = |dx: f64, dy: f64| {
+        let place = PixelPoint::new(pixel.x + dx, pixel.y + dy);
+        Some(*grid.camera().direction_of(&place)?.as_vector())
+    };
+    let across = at(0.5, 0.0)? - at(-0.5, 0.0)?;
+    let down = at(0.0, 0.5)? - at(0.0, -0.5)?;
+    Some(across.cross(&down).norm())
+}
+
+/// The noise of a pixel from differences between pixels; stars are among the largest.
+fn noise_of(mut differences_adu: Vec<f32>) -> f64 {
+    /// Share of the differences that count, and their mean for noise of 1.
+    const KEPT: f64 = 0.9;
+    const MEAN: f64 = 0.6574;
+    differences_adu.sort_unstable_by(f32::total_cmp);
+    let kept = (KEPT * differences_adu.len() as f64) as usize;
+    let sum: f64 = differences_adu[..kept].iter().map(|d| f64::from(*d)).sum();
+    sum / kept as f64 / MEAN / 2.0_f64.sqrt()
+}
+
+/// How a meter weighs what is this far from the zenith.
+///
+/// # Reference
+/// Cinzano 2005, ISTIL Internal Report 9, for the SQM-L.
+fn meter_weight(angle_deg: f64) -> f64 {
+    if angle_deg > METER_REACH_DEG {
+        return 0.0;
+    }
+    libm::exp(-4.0 * libm::log(2.0) * (angle_deg / METER_DEG).powi(2))
+}
+
+/// The solid angle that it sees, weighted.
+fn meter_solid_angle_sr() -> f64 {
+    const STEPS: u32 = 300;
+    let step_rad = METER_REACH_DEG * RAD_PER_DEG / f64::from(STEPS);
+    let ring = |step: u32| {
+        let angle_rad = (f64::from(step) + 0.5) * step_rad;
+        meter_weight(angle_rad * DEG_PER_RAD) * libm::sin(angle_rad)
+    };
+    2.0 * PI * step_rad * (0..STEPS).map(ring).sum::<f64>()
+}
+
+/// The luminance of a sky of this brightness.
+///
+/// # Reference
+/// The convention of makers of meters: 10.8e4 cd/m² at V = 0 in a square arcsecond. By the spectrum of the
+/// sky it is up to 30 % more (Bará et al. 2020, MNRAS 493, 2429).
+fn luminance_cd_m2(mag_arcsec2: f64) -> f64 {
+    10.8e4 * libm::pow(10.0, -0.4 * mag_arcsec2)
+}
+
+/// The faintest star for the unaided eye.
+///
+/// # Reference
+/// Schaefer 1990, PASP 102, 212, in the form that makers of meters print.
+fn naked_eye_limit_vmag(mag_arcsec2: f64) -> f64 {
+    7.93 - 5.0 * libm::log10(libm::pow(10.0, 4.316 - mag_arcsec2 / 5.0) + 1.0)
+}
+
+/// Bortle's class by the brightness of the zenith: within one class. Bortle (2001, Sky & Telescope 101 (2),
+/// 126) defines them by what the eye sees; these limits in brightness are those of DeepskyLog.
+fn bortle(mag_arcsec2: f64) -> u8 {
+    /// The darkest brightness of each class but the first.
+    const DARKEST: [f64; 8] = [21.7, 21.5, 21.3, 20.4, 19.1, 18.5, 18.0, 17.5];
+    1 + DARKEST
+        .iter()
+        .filter(|darkest| mag_arcsec2 < **darkest)
+        .count() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brightness_in_other_units() {
+        assert!((luminance_cd_m2(21.6) * 1e3 - 0.247).abs() < 0.001);
+        assert!((naked_eye_limit_vmag(21.6) - 6.5).abs() < 0.1);
+        assert!((naked_eye_limit_vmag(18.0) - 4.0).abs() < 0.3);
+        assert_eq!([22.0, 21.6, 21.0, 19.0, 17.0].map(bortle), [1, 2, 4, 6, 9]);
+    }
+
+    #[test]
+    fn noise_is_that_of_most_differences() {
+        // The quantiles of a normal distribution with a standard deviation of 3√2.
+        let normal = |i: i32| {
+            let p = (f64::from(i) + 0.5) / 4000.0;
+            let mut z = 0.0_f64;
+            for _ in 0..60 {
+                let off = crate::base::statistics::normal_cdf(z) - p;
+                z -= off / crate::base::statistics::normal_density(z).max(1e-3);
+            }
+            (3.0 * 2.0_f64.sqrt() * z).abs() as f32
+        };
+        let mut differences: Vec<f32> = (0..4000).map(normal).collect();
+        assert!((noise_of(differences.clone()) - 3.0).abs() < 0.02);
+        differences[..100].fill(500.0);
+        assert!((noise_of(differences) - 3.0).abs() < 0.15);
+    }
+}

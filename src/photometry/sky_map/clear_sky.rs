@@ -1,0 +1,295 @@
+//! The air without clouds: the zero point outside the atmosphere, and extinction per airmass.
+//!
+//! ```text
+//! V = Z + m + c (B−V − 0.6) − k X − a ρ² − b ρ⁴
+//! ```
+//!
+//! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field. What is known of
+//! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars,
+//! so the relation is that of the brightest ones: stars well below it are left out, round by round.
+
+use super::stars::{Measured, SkyStar};
+use crate::base::statistics::{Estimate, median};
+use crate::photometry::zero_point::REFERENCE_BV_MAG;
+use nalgebra::{SMatrix, SVector};
+
+/// Unknowns: Z, c, k, a, b.
+const UNKNOWNS: usize = 5;
+const COLOR: usize = 1;
+const EXTINCTION: usize = 2;
+const VIGNETTING: [usize; 2] = [3, 4];
+/// Extinction in V, in magnitudes per airmass, and how it differs from place to place and night to night
+/// (Patat et al. 2011, A&A 527, A91, for Paranal: 0.12; 0.2 to 0.3 near sea level).
+const USUAL_EXTINCTION: Estimate = Estimate {
+    value: 0.2,
+    sigma: 0.1,
+};
+/// Color terms of cameras.
+const USUAL_COLOR_SIGMA: f64 = 0.3;
+/// Loss of light at the edge where no flat removed it, in magnitudes: of the terms with ρ² and ρ⁴.
+const USUAL_LOSS: [Estimate; 2] = [
+    Estimate {
+        value: 0.3,
+        sigma: 0.7,
+    },
+    Estimate {
+        value: 0.0,
+        sigma: 0.3,
+    },
+];
+/// The same where a flat did, or the loss is stated.
+const FLAT_SIGMA_MAG: f64 = 0.01;
+/// Least number of stars.
+const MIN_STARS: usize = 12;
+/// Stars for which a larger error is expected are left out: they are brightened by being detected. A choice
+/// by the error that they have would prefer those that noise makes brighter.
+const LARGEST_SIGMA_MAG: f64 = 0.1;
+
+/// The air without clouds, and the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ClearSky {
+    /// V magnitude of a star of B−V 0.6 outside the atmosphere that gives 1 ADU in a second at the frame's
+    /// centre.
+    pub zero_point_vmag: Estimate,
+    /// Extinction in magnitudes per airmass.
+    pub extinction_mag: Estimate,
+    /// Whether the frame's stars, and not experience, tell the extinction.
+    pub is_extinction_measured: bool,
+    /// Magnitudes per magnitude of B−V.
+    pub color_term: Estimate,
+    /// Magnitudes by which stars at the edge of the field are dimmer than at its centre.
+    pub edge_loss_mag: Estimate,
+    /// Standard deviation of a bright star about the relation.
+    pub scatter_mag: f64,
+    /// Number of stars.
+    pub stars: usize,
+    /// Whether airmasses are known.
+    pub has_horizon: bool,
+    unknowns: [f64; UNKNOWNS],
+    /// Error of the zero point seen through one airmass.
+    ground_sigma_mag: f64,
+}
+
+/// A fit.
+struct Fit {
+    unknowns: SVector<f64, UNKNOWNS>,
+    covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+}
+
+/// A star by which it may be measured.
+struct Candidate {
+    row: SVector<f64, UNKNOWNS>,
+    /// V magnitude less the instrumental one.
+    offset_mag: f64,
+    /// Standard error of that by its own flux.
+    sigma_mag: f64,
+}
+
+impl Candidate {
+    fn of(star: &SkyStar) -> Option<Self> {
+        let Measured {
+            instrumental_mag,
+            sigma_mag,
+        } = star.measured?;
+        Some(Self {
+            row: SVector::from(row_of(star.airmass, star.off_centre_sq, star.bv_mag)),
+            offset_mag: star.v_mag - instrumental_mag,
+            sigma_mag,
+        })
+    }
+
+    /// By how much it is brighter than a fit says.
+    fn residual_mag(&self, fit: &Fit) -> f64 {
+        self.offset_mag - fit.unknowns.dot(&self.row)
+    }
+
+    /// Its standard error if it were as bright as the fit says.
+    fn expected_sigma_mag(&self, fit: &Fit) -> f64 {
+        self.sigma_mag * libm::pow(10.0, 0.4 * self.residual_mag(fit))
+    }
+
+    /// Whether it belongs to the clear sky of a fit.
+    fn is_kept(&self, fit: &Fit, scatter_mag: f64) -> bool {
+        /// Stars this far below the relation are behind clouds, or variable,
+        const LOW_SIGMAS: f64 = 2.5;
+        /// and this far above it something else.
+        const HIGH_SIGMAS: f64 = 4.0;
+        let expected_mag = self.expected_sigma_mag(fit);
+        let off = self.residual_mag(fit) / expected_mag.hypot(scatter_mag);
+        expected_mag < LARGEST_SIGMA_MAG && (-LOW_SIGMAS..HIGH_SIGMAS).contains(&off)
+    }
+}
+
+impl ClearSky {
+    /// Measures it; `None` with too few stars.
+    pub(super) fn of(stars: &[SkyStar], is_flat: bool) -> Option<Self> {
+        const ROUNDS: usize = 30;
+        /// Scatter of stars, in magnitudes, in the first round and at most.
+        const FIRST_SCATTER_MAG: f64 = 0.2;
+        const MOST_SCATTER_MAG: f64 = 0.5;
+        let candidates: Vec<Candidate> = stars.iter().filter_map(Candidate::of).collect();
+        let mut fit = Fit::first(&candidates, is_flat)?;
+        let (mut scatter_mag, mut used) = (FIRST_SCATTER_MAG, 0);
+        for _ in 0..ROUNDS {
+            let kept = |star: &&Candidate| star.is_kept(&fit, scatter_mag);
+            let kept: Vec<&Candidate> = candidates.iter().filter(kept).collect();
+            if kept.len() < MIN_STARS {
+                return None;
+            }
+            let next = Fit::of(&kept, &fit, scatter_mag, is_flat)?;
+            let next_scatter_mag = scatter(&kept, &next).min(MOST_SCATTER_MAG);
+            let is_settled = kept.len() == used && (next_scatter_mag - scatter_mag).abs() < 1e-4;
+            (fit, scatter_mag, used) = (next, next_scatter_mag, kept.len());
+            if is_settled {
+                break;
+            }
+        }
+        let has_horizon = stars.iter().any(|star| star.airmass.is_some());
+        Some(fit.clear_sky(scatter_mag, used, has_horizon))
+    }
+
+    /// The relation's Z − k X − a ρ² − b ρ⁴ + c (B−V − 0.6), at a place and for a star of a color.
+    pub(super) fn zero_point_at(
+        &self,
+        airmass: Option<f64>,
+        off_centre_sq: f64,
+        bv_mag: Option<f64>,
+    ) -> f64 {
+        let row = row_of(airmass, off_centre_sq, bv_mag);
+        row.iter().zip(self.unknowns).map(|(a, b)| a * b).sum()
+    }
+
+    /// The zero point for light of a color at the ground, at the frame's centre, and its error.
+    pub(super) fn at_ground(&self, bv_mag: f64) -> Estimate {
+        Estimate {
+            value: self.unknowns[0] + self.unknowns[COLOR] * (bv_mag - REFERENCE_BV_MAG),
+            sigma: self.ground_sigma_mag,
+        }
+    }
+
+    /// What arrives at a place, over what arrives at the centre.
+    pub(super) fn transmission(&self, off_centre_sq: f64) -> f64 {
+        let [a, b] = VIGNETTING.map(|unknown| self.unknowns[unknown]);
+        let loss_mag = a * off_centre_sq + b * off_centre_sq * off_centre_sq;
+        libm::pow(10.0, -0.4 * loss_mag)
+    }
+}
+
+/// The scatter of stars beyond their errors. Only what is above the relation is noise alone.
+fn scatter(stars: &[&Candidate], fit: &Fit) -> f64 {
+    /// Least scatter of a star: its catalogue magnitude and its pixels.
+    const LEAST_MAG: f64 = 0.01;
+    /// Standard deviation of normal noise over its median size.
+    const PER_MEDIAN: f64 = 1.4826;
+    let above = stars.iter().filter(|star| star.residual_mag(fit) > 0.0);
+    let excess = |star: &&Candidate| {
+        (PER_MEDIAN * star.residual_mag(fit)).powi(2) - star.expected_sigma_mag(fit).powi(2)
+    };
+    let mut excess: Vec<f64> = above.map(excess).collect();
+    if excess.is_empty() {
+        return LEAST_MAG;
+    }
+    median(&mut excess).max(LEAST_MAG.powi(2)).sqrt()
+}
+
+/// The derivatives of the relation by the unknowns.
+fn row_of(airmass: Option<f64>, off_centre_sq: f64, bv_mag: Option<f64>) -> [f64; UNKNOWNS] {
+    [
+        1.0,
+        bv_mag.map_or(0.0, |bv_mag| bv_mag - REFERENCE_BV_MAG),
+        // Without a horizon the zero point is that of the ground.
+        -airmass.unwrap_or(0.0),
+        -off_centre_sq,
+        -off_centre_sq * off_centre_sq,
+    ]
+}
+
+impl Fit {
+    /// Expected values of the unknowns and their standard deviations; nothing is known of Z.
+    fn experience(is_flat: bool) -> [Estimate; UNKNOWNS] {
+        let flat = Estimate {
+            value: 0.0,
+            sigma: FLAT_SIGMA_MAG,
+        };
+        let [first, second] = if is_flat { [flat; 2] } else { USUAL_LOSS };
+        let of = |value: f64, sigma: f64| Estimate { value, sigma };
+        [
+            of(0.0, f64::INFINITY),
+            of(0.0, USUAL_COLOR_SIGMA),
+            USUAL_EXTINCTION,
+            first,
+            second,
+        ]
+    }
+
+    /// The relation of experience, as high as the brightest of the stars ask for.
+    fn first(stars: &[Candidate], is_flat: bool) -> Option<Self> {
+        /// Share of the stars above it.
+        const TOP: f64 = 0.3;
+        let mut fit = Self {
+            unknowns: SVector::from(Self::experience(is_flat).map(|known| known.value)),
+            covariance: SMatrix::zeros(),
+        };
+        let bright = stars
+            .iter()
+            .filter(|star| star.sigma_mag < LARGEST_SIGMA_MAG);
+        let mut above: Vec<f64> = bright.map(|star| star.residual_mag(&fit)).collect();
+        above.sort_unstable_by(|a, b| b.total_cmp(a));
+        fit.unknowns[0] += above.get((TOP * above.len() as f64) as usize)?;
+        Some(fit)
+    }
+
+    /// The fit to `stars`, with the errors that they have by the fit `before`.
+    fn of(stars: &[&Candidate], before: &Self, scatter_mag: f64, is_flat: bool) -> Option<Self> {
+        let known = Self::experience(is_flat);
+        let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+        let mut right = SVector::<f64, UNKNOWNS>::zeros();
+        for (unknown, Estimate { value, sigma }) in known.into_iter().enumerate() {
+            normal[(unknown, unknown)] += sigma.powi(-2);
+            right[unknown] += value * sigma.powi(-2);
+        }
+        for star in stars {
+            let variance = star.expected_sigma_mag(before).powi(2) + scatter_mag.powi(2);
+            normal += star.row * star.row.transpose() / variance;
+            right += star.row * (star.offset_mag / variance);
+        }
+        let root = normal.cholesky()?;
+        Some(Self {
+            unknowns: root.solve(&right),
+            covariance: root.inverse(),
+        })
+    }
+
+    fn variance(&self, row: &SVector<f64, UNKNOWNS>) -> f64 {
+        row.dot(&(self.covariance * row)).max(0.0)
+    }
+
+    fn clear_sky(&self, scatter_mag: f64, stars: usize, has_horizon: bool) -> ClearSky {
+        /// Part of what experience leaves open that a measured extinction leaves.
+        const MEASURED: f64 = 0.5;
+        let estimate = |unknown: usize| Estimate {
+            value: self.unknowns[unknown],
+            sigma: self.covariance[(unknown, unknown)].max(0.0).sqrt(),
+        };
+        let edge = SVector::from(row_of(None, 1.0, None)) - SVector::from(row_of(None, 0.0, None));
+        let extinction_mag = estimate(EXTINCTION);
+        ClearSky {
+            zero_point_vmag: estimate(0),
+            extinction_mag,
+            is_extinction_measured: extinction_mag.sigma < MEASURED * USUAL_EXTINCTION.sigma,
+            color_term: estimate(COLOR),
+            edge_loss_mag: Estimate {
+                value: -self.unknowns.dot(&edge),
+                sigma: self.variance(&edge).sqrt(),
+            },
+            scatter_mag,
+            stars,
+            has_horizon,
+            unknowns: self.unknowns.into(),
+            ground_sigma_mag: self
+                .variance(&SVector::from(row_of(None, 0.0, None)))
+                .sqrt(),
+        }
+    }
+}

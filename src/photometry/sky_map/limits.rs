@@ -1,0 +1,64 @@
+//! How faint stars go at each place, and how faint they should go: by the camera's description with the
+//! noise there, or without one by the threshold there and the clear parts of the frame.
+
+use super::clouds::CellClouds;
+use super::witnesses::{Sky, Witness};
+use crate::base::statistics::Estimate;
+use crate::photometry::completeness::{self, CountedStar};
+
+/// The limits of a cell.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CellLimits {
+    /// The limit without clouds.
+    pub expected_vmag: Option<f64>,
+    /// The limit of the stars around it.
+    pub measured_vmag: Option<Estimate>,
+}
+
+/// The limits of each cell. `stated_vmag` is the limit of the whole frame by the camera's description.
+pub(super) fn limits(
+    sky: &Sky,
+    clouds: &[CellClouds],
+    stated_vmag: Option<f64>,
+) -> Vec<CellLimits> {
+    /// Stars of a limit.
+    const MIN_STARS: usize = 20;
+    let witnesses = sky.witnesses();
+    let is_clear = |cell: usize| clouds[cell].clear.is_some_and(|clear| clear > 0.5);
+    let counted = |witness: &Witness, v_mag: f64| CountedStar {
+        v_mag,
+        detected: witness.star.is_detected,
+    };
+    let relative: Vec<CountedStar> = witnesses
+        .iter()
+        .filter(|witness| is_clear(witness.cell))
+        .map(|witness| counted(witness, witness.relative_mag))
+        .collect();
+    let own = completeness::measure(&relative, sky.chance).limit.ok();
+    let over_noise = stated_vmag.map(|limit_vmag| limit_vmag - sky.typical_noise_vmag());
+    let of_cell = |cell: usize| {
+        let Some(depth) = sky.depths[cell] else {
+            return CellLimits::default();
+        };
+        let near: Vec<CountedStar> = witnesses
+            .iter()
+            .filter(|witness| sky.grid.weight(cell, &witness.star.direction).is_some())
+            .map(|witness| counted(witness, witness.star.v_mag))
+            .collect();
+        let measured = (near.len() >= MIN_STARS)
+            .then(|| completeness::measure(&near, sky.chance).limit.ok())
+            .flatten();
+        CellLimits {
+            expected_vmag: match (over_noise, &own) {
+                (Some(over), _) => Some(over + depth.noise_vmag),
+                (None, Some(own)) => Some(own.v_mag + depth.threshold_vmag),
+                (None, None) => None,
+            },
+            measured_vmag: measured.map(|limit| Estimate {
+                value: limit.v_mag,
+                sigma: limit.sigma_mag,
+            }),
+        }
+    };
+    (0..clouds.len()).map(of_cell).collect()
+}

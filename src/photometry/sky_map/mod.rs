@@ -1,0 +1,165 @@
+//! The sky over an identified frame: how bright it is at each place, how much light the air and clouds
+//! take, and how faint stars go there.
+//!
+//! ([`IdentifiedFrame`], [`Picture`]) → [`SkyMap`]
+//!
+//! 1. The frame is divided into cells (`grid`): rings of altitude where the horizon is known, else
+//!    rectangles of the frame.
+//! 2. The stars that are not dimmed give the clear sky (`clear_sky`): the zero point outside the
+//!    atmosphere, and the extinction per airmass.
+//! 3. In each cell, the stars that are dimmed or missing give the extinction beyond it, and the
+//!    probability that it is hardly any (`clouds`).
+//! 4. The background above the bias, over the solid angle of a pixel, is the sky's brightness
+//!    (`brightness`).
+//! 5. The noise and the extinction of a cell tell how faint its stars should go, and the stars around it
+//!    how faint they go (`limits`).
+//!
+//! Caveats: a frame's band is not V. The zero point is that of stars; the sky has another color, and its
+//! brightness the error that this makes. Without a flat, a lens that points to the zenith loses light
+//! towards the edge as the air does, and the errors of both say so.
+
+mod brightness;
+mod clear_sky;
+mod clouds;
+mod depth;
+mod grid;
+mod limits;
+mod picture;
+mod relative_limit;
+mod stars;
+mod witnesses;
+
+pub use brightness::{NoBrightness, SkyLight, ZenithSky};
+pub use clear_sky::ClearSky;
+pub use clouds::CLEAR_MAG;
+pub use grid::Place;
+#[doc(hidden)]
+pub use picture::Picture;
+
+use super::IdentifiedFrame;
+use super::association::associate;
+use crate::base::statistics::Estimate;
+use crate::identify::{IndexedCatalog, SkyView};
+use brightness::Levels;
+use grid::Grid;
+use witnesses::Sky;
+
+/// The sky over a frame.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SkyMap {
+    /// The parts of the sky, from the horizon up, or row by row.
+    pub cells: Vec<SkyCell>,
+    /// The air without clouds.
+    pub clear_sky: ClearSky,
+    /// Why no brightness was measured.
+    pub no_brightness: Option<NoBrightness>,
+    /// The brightness at the zenith, where it is in the frame.
+    pub zenith: Option<ZenithSky>,
+    /// Share of the sky in the frame that is behind clouds.
+    pub cloud_share: Option<Estimate>,
+}
+
+/// A part of the sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct SkyCell {
+    /// Where it is.
+    pub place: Place,
+    /// Solid angle of its sky in the frame, in steradians.
+    pub solid_angle_sr: f64,
+    /// Its brightness.
+    pub light: Option<SkyLight>,
+    /// Stars that a clear sky would show.
+    pub expected: usize,
+    /// Those of them that were detected.
+    pub detected: usize,
+    /// Extinction beyond that of clear air, in magnitudes.
+    pub extinction_mag: Option<Estimate>,
+    /// Probability that this is below [`CLEAR_MAG`].
+    pub clear: Option<f64>,
+    /// V magnitude at which half of the stars should be detected, without clouds.
+    pub expected_limit_vmag: Option<f64>,
+    /// V magnitude at which half of the stars around it are detected.
+    pub limit_vmag: Option<Estimate>,
+}
+
+/// Measures the sky over `frame`; `None` where too few stars tell the zero point.
+#[doc(hidden)]
+pub fn measure(
+    frame: &IdentifiedFrame,
+    picture: &Picture,
+    catalog: &IndexedCatalog,
+    expected_limit_vmag: Option<f64>,
+) -> Option<SkyMap> {
+    let view = SkyView {
+        camera: &frame.identification.camera,
+        icrs_to_camera: &frame.identification.icrs_to_camera,
+        places: frame.places,
+    };
+    let predicted = view.stars_to(catalog, super::depth_v_mag(frame, catalog));
+    let association = associate(frame, &predicted);
+    let stars = stars::of(frame, &association, &predicted, catalog);
+    let clear_sky = ClearSky::of(&stars, picture.is_flat)?;
+    let grid = Grid::over(frame);
+    let levels = Levels::of(frame, picture, &grid, &clear_sky);
+    let depths = depth::depths(&levels, &clear_sky);
+    let sky = Sky {
+        grid: &grid,
+        stars: &stars,
+        clear_sky: &clear_sky,
+        depths: &depths,
+        places: frame.places,
+        detections: frame.detections,
+        exposure_s: levels.exposure_s,
+        chance: association.chance,
+    };
+    let clouds = sky.clouds();
+    let limits = limits::limits(&sky, &clouds, expected_limit_vmag);
+    let no_brightness = brightness::refusal(picture);
+    let light = |cell: usize| match no_brightness {
+        None => levels.light(cell, &clear_sky),
+        Some(_) => None,
+    };
+    let cells = grid.places.iter().enumerate().map(|(cell, place)| SkyCell {
+        place: *place,
+        solid_angle_sr: levels.cells[cell].solid_angle_sr,
+        light: light(cell),
+        expected: clouds[cell].expected,
+        detected: clouds[cell].detected,
+        extinction_mag: clouds[cell].extinction_mag,
+        clear: clouds[cell].clear,
+        expected_limit_vmag: limits[cell].expected_vmag,
+        limit_vmag: limits[cell].measured_vmag,
+    });
+    let cells: Vec<SkyCell> = cells.filter(|cell| cell.solid_angle_sr > 0.0).collect();
+    Some(SkyMap {
+        cloud_share: cloud_share(&cells),
+        zenith: no_brightness
+            .is_none()
+            .then(|| levels.zenith(&clear_sky))
+            .flatten(),
+        no_brightness,
+        clear_sky,
+        cells,
+    })
+}
+
+/// Share of the sky that is behind clouds.
+fn cloud_share(cells: &[SkyCell]) -> Option<Estimate> {
+    let known = || {
+        cells
+            .iter()
+            .filter_map(|cell| Some((cell.solid_angle_sr, cell.clear?)))
+    };
+    let all_sr: f64 = known().map(|(solid_angle_sr, _)| solid_angle_sr).sum();
+    let mean = |of: &dyn Fn(f64, f64) -> f64| {
+        known()
+            .map(|(sr, clear)| of(sr / all_sr, clear))
+            .sum::<f64>()
+    };
+    (all_sr > 0.0).then(|| Estimate {
+        value: mean(&|share, clear| share * (1.0 - clear)),
+        sigma: mean(&|share, clear| share * share * clear * (1.0 - clear)).sqrt(),
+    })
+}

@@ -1,0 +1,58 @@
+//! The completeness of a clear sky.
+
+use super::clear_sky::ClearSky;
+use super::witnesses::Witness;
+use crate::photometry::completeness::{self, CountedStar, Limit};
+
+/// The magnitude at which half of the stars are detected, over that of the threshold: about 0.
+pub(super) struct RelativeLimit(Limit);
+
+impl RelativeLimit {
+    /// That of the stars that are not dimmed, as far as is known: clouds are not in it where most of the
+    /// sky is clear.
+    pub(super) fn of_clear_sky(
+        witnesses: &[Witness],
+        clear_sky: &ClearSky,
+        chance: f64,
+    ) -> Option<Self> {
+        /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
+        const DIMMED_SIGMAS: f64 = 3.0;
+        let is_dimmed = |witness: &&Witness| {
+            let star = witness.star;
+            star.measured.is_some_and(|measured| {
+                let zero_point =
+                    clear_sky.zero_point_at(star.airmass, star.off_centre_sq, star.bv_mag);
+                let dimmer_mag = measured.instrumental_mag + zero_point - star.v_mag;
+                dimmer_mag > DIMMED_SIGMAS * measured.sigma_mag.hypot(clear_sky.scatter_mag)
+            })
+        };
+        let cells = 1 + witnesses.iter().map(|witness| witness.cell).max()?;
+        let mut dimmed = vec![[0usize; 2]; cells];
+        for witness in witnesses
+            .iter()
+            .filter(|witness| witness.star.measured.is_some())
+        {
+            dimmed[witness.cell][0] += 1;
+            dimmed[witness.cell][1] += usize::from(is_dimmed(&witness));
+        }
+        let is_clear = |witness: &&Witness| {
+            let [all, dimmed] = dimmed[witness.cell];
+            all > 0 && 4 * dimmed <= all
+        };
+        let counted: Vec<CountedStar> = witnesses
+            .iter()
+            .filter(is_clear)
+            .map(|witness| CountedStar {
+                v_mag: witness.relative_mag,
+                detected: witness.star.is_detected,
+            })
+            .collect();
+        completeness::measure(&counted, chance).limit.ok().map(Self)
+    }
+
+    /// The probability that a star is detected.
+    pub(super) fn probability(&self, relative_mag: f64) -> f64 {
+        let Self(limit) = self;
+        limit.probability(relative_mag)
+    }
+}

@@ -1,0 +1,88 @@
+//! The stars by which the sky is measured.
+
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::camera::data_sheet::lens_transmission;
+use crate::identify::{IndexedCatalog, PredictedStar};
+use crate::photometry::association::Association;
+use crate::photometry::{
+    IdentifiedFrame, MAG_PER_RELATIVE, instrumental_mag, is_constant_and_single,
+};
+
+/// A star that the frame should show, alone at its place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SkyStar {
+    /// Where it is in the frame.
+    pub pixel: PixelPoint,
+    /// The direction in which it appears.
+    pub direction: UnitVector<Icrs>,
+    /// V magnitude.
+    pub v_mag: f64,
+    /// B−V, where known.
+    pub bv_mag: Option<f64>,
+    /// Airmass of its light, where the horizon is known.
+    pub airmass: Option<f64>,
+    /// Distance from the frame's centre over that of the edge of the field, squared.
+    pub off_centre_sq: f64,
+    /// Whether it was detected.
+    pub is_detected: bool,
+    /// Its brightness in the frame, where that is clean.
+    pub measured: Option<Measured>,
+}
+
+/// A star's brightness in the frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured {
+    /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without what the lens takes.
+    pub instrumental_mag: f64,
+    /// Its standard error.
+    pub sigma_mag: f64,
+}
+
+/// The stars of a frame that are alone at their places.
+pub(super) fn of(
+    frame: &IdentifiedFrame,
+    association: &Association,
+    predicted: &[PredictedStar],
+    catalog: &IndexedCatalog,
+) -> Vec<SkyStar> {
+    let found = frame.identification;
+    let camera = &found.camera;
+    let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
+    let inside = predicted.iter().filter(|star| camera.contains(&star.pixel));
+    let both = association.stars.iter().zip(inside);
+    let clear = both.filter(|(star, _)| star.is_clear);
+    clear
+        .map(|(star, predicted)| {
+            let known = catalog.catalog().star(star.star);
+            let off_centre_sq = camera.off_centre_sq(&predicted.pixel);
+            let detection = star.detection.map(|index| &frame.detections.sources[index]);
+            let clean = detection.filter(|detection| {
+                detection.flags.has_clean_flux() && is_constant_and_single(known)
+            });
+            let measured = clean
+                .filter(|detection| detection.flux_adu > 0.0)
+                .map(|detection| {
+                    let flux_adu = detection.flux_adu
+                        / (1.0 + star.neighbors_light)
+                        / lens_transmission(frame.vignetting, off_centre_sq);
+                    Measured {
+                        instrumental_mag: instrumental_mag(
+                            flux_adu / frame.exposure_s.unwrap_or(1.0),
+                        ),
+                        sigma_mag: MAG_PER_RELATIVE / detection.snr,
+                    }
+                });
+            let direction = frame.places.of(known);
+            SkyStar {
+                direction,
+                pixel: predicted.pixel,
+                v_mag: star.v_mag,
+                bv_mag: known.bv_mag.map(f64::from),
+                airmass: frame.places.airmass(&direction),
+                off_centre_sq: off_centre_sq / edge_sq,
+                is_detected: detection.is_some(),
+                measured,
+            }
+        })
+        .collect()
+}

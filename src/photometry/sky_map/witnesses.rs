@@ -1,0 +1,75 @@
+//! The stars as witnesses of the sky in which they are.
+
+use super::clear_sky::ClearSky;
+use super::depth::Depth;
+use super::grid::Grid;
+use super::stars::SkyStar;
+use crate::detect::Detections;
+use crate::photometry::instrumental_mag;
+use crate::photometry::zero_point::REFERENCE_BV_MAG;
+use crate::sky::places::StarPlaces;
+
+/// What is known of the sky before clouds.
+pub(super) struct Sky<'a> {
+    /// The cells.
+    pub grid: &'a Grid<'a>,
+    /// The stars.
+    pub stars: &'a [SkyStar],
+    /// The air without clouds.
+    pub clear_sky: &'a ClearSky,
+    /// How faint stars go in each cell.
+    pub depths: &'a [Option<Depth>],
+    /// Where stars appear.
+    pub places: StarPlaces,
+    /// What was detected.
+    pub detections: &'a Detections,
+    /// Fluxes are over this time.
+    pub exposure_s: f64,
+    /// Probability that a star has a detection by chance.
+    pub chance: f64,
+}
+
+/// A star as a witness of clouds.
+pub(super) struct Witness<'a> {
+    /// The star.
+    pub star: &'a SkyStar,
+    /// Its cell.
+    pub cell: usize,
+    /// Its magnitude in clear air over that of the threshold at its place.
+    pub relative_mag: f64,
+}
+
+impl Sky<'_> {
+    /// V magnitude of a star at the frame's centre whose flux is the typical noise of a pixel: for these the
+    /// limit of the whole frame is predicted.
+    pub(super) fn typical_noise_vmag(&self) -> f64 {
+        let center = self.grid.direction_of(&self.grid.camera().centre());
+        let airmass = center.and_then(|center| self.places.airmass(&center));
+        let noise_adu = self.detections.noise_adu;
+        self.clear_sky
+            .zero_point_at(airmass, 0.0, Some(REFERENCE_BV_MAG))
+            + instrumental_mag(noise_adu / self.exposure_s)
+    }
+
+    /// The stars in cells whose depth is known.
+    pub(super) fn witnesses(&self) -> Vec<Witness<'_>> {
+        let witness = |star| self.witness(star);
+        self.stars.iter().filter_map(witness).collect()
+    }
+
+    fn witness<'s>(&self, star: &'s SkyStar) -> Option<Witness<'s>> {
+        let cell = self.grid.cell_of(&star.pixel, &star.direction)?;
+        let camera = self.grid.camera();
+        let limits = &self.detections.flux_limits;
+        let limit_adu = limits.at(&star.pixel, [camera.width_px, camera.height_px])?;
+        let zero_point =
+            self.clear_sky
+                .zero_point_at(star.airmass, star.off_centre_sq, star.bv_mag);
+        let limit_vmag = zero_point + instrumental_mag(limit_adu / self.exposure_s);
+        Some(Witness {
+            star,
+            cell,
+            relative_mag: star.v_mag - limit_vmag,
+        })
+    }
+}

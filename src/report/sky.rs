@@ -1,0 +1,245 @@
+//! The sky at each place of a frame, in reports.
+
+use super::digits::{HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS, SHARE_DECIMALS};
+use super::text::labelled;
+use crate::base::format::{counted, significant, to_decimals};
+use crate::base::statistics::Estimate;
+use crate::photometry::sky_map::{Place, SkyCell, SkyMap, ZenithSky};
+use serde::Serialize;
+
+/// Significant digits of solid angles, luminances and probabilities.
+const DIGITS: i32 = 4;
+
+/// The sky at each place of a frame. Magnitudes are those of V.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SkyReport {
+    /// V magnitude of a star of B−V 0.6 outside the atmosphere that gives 1 ADU/s, or 1 ADU without an
+    /// exposure, at the frame's centre; without a site and a time, of one seen through the air.
+    pub zero_point_vmag: f64,
+    /// Its standard error.
+    pub zero_point_sigma_mag: f64,
+    /// Extinction in magnitudes per airmass, where site and time are known.
+    pub extinction_mag_per_airmass: Option<f64>,
+    /// Its standard error.
+    pub extinction_sigma_mag: Option<f64>,
+    /// Whether the stars of the frame tell the extinction, and not experience.
+    pub extinction_measured: bool,
+    /// Magnitudes by which stars at the edge of the field are dimmer than at its centre.
+    pub edge_loss_mag: f64,
+    /// Its standard error.
+    pub edge_loss_sigma_mag: f64,
+    /// Stars that are behind no cloud, by which these were measured.
+    pub stars: usize,
+    /// Why no brightness was measured: `bias_unknown` or `not_linear`.
+    pub no_brightness: Option<&'static str>,
+    /// The brightness at the zenith, as a meter with a field of 20° sees it.
+    pub zenith: Option<ZenithReport>,
+    /// Share of the sky in the frame that is behind clouds.
+    pub cloud_share: Option<f64>,
+    /// Its standard error.
+    pub cloud_share_sigma: Option<f64>,
+    /// The parts of the sky.
+    pub cells: Vec<SkyCellReport>,
+    #[serde(skip)]
+    no_brightness_text: Option<&'static str>,
+}
+
+/// The brightness at the zenith.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ZenithReport {
+    /// V magnitude of a square arcsecond.
+    pub mag_arcsec2: f64,
+    /// Its standard error.
+    pub sigma_mag: f64,
+    /// Luminance, in mcd/m².
+    pub luminance_mcd_m2: f64,
+    /// V magnitude of the faintest star that the unaided eye sees.
+    pub naked_eye_limit_vmag: f64,
+    /// Bortle's class.
+    pub bortle: u8,
+}
+
+/// A part of the sky.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct SkyCellReport {
+    /// From and to, in degrees; `null` where the horizon is not known, or the field is narrow.
+    pub altitude_deg: Option<[f64; 2]>,
+    /// From and to, in degrees from north through east.
+    pub azimuth_deg: Option<[f64; 2]>,
+    /// First and last column, where the cell is a part of the frame.
+    pub x: Option<[f64; 2]>,
+    /// First and last row.
+    pub y: Option<[f64; 2]>,
+    /// Solid angle of its sky in the frame, in steradians.
+    pub solid_angle_sr: Option<f64>,
+    /// Brightness: V magnitude of a square arcsecond.
+    pub mag_arcsec2: Option<f64>,
+    /// Its standard error.
+    pub sigma_mag: Option<f64>,
+    /// Luminance, in mcd/m².
+    pub luminance_mcd_m2: Option<f64>,
+    /// Stars that a clear sky would show.
+    pub expected: usize,
+    /// Those of them that were detected.
+    pub detected: usize,
+    /// Extinction beyond that of clear air, in magnitudes.
+    pub extinction_mag: Option<f64>,
+    /// Its standard error.
+    pub extinction_sigma_mag: Option<f64>,
+    /// Probability that this is below 0.2 mag.
+    pub clear: Option<f64>,
+    /// V magnitude at which half of the stars should be detected, without clouds.
+    pub expected_limit_vmag: Option<f64>,
+    /// V magnitude at which half of the stars around it are detected.
+    pub limit_vmag: Option<f64>,
+    /// Its standard error.
+    pub limit_sigma_mag: Option<f64>,
+}
+
+fn mag(value: f64) -> f64 {
+    to_decimals(value, MAG_DECIMALS)
+}
+
+impl SkyReport {
+    pub(super) fn new(sky: &SkyMap) -> Self {
+        let clear = &sky.clear_sky;
+        let has_horizon = clear.has_horizon;
+        let share = |value: fn(&Estimate) -> f64| {
+            let share = sky.cloud_share.as_ref();
+            share.map(|share| to_decimals(value(share), SHARE_DECIMALS))
+        };
+        Self {
+            zero_point_vmag: mag(clear.zero_point_vmag.value),
+            zero_point_sigma_mag: mag(clear.zero_point_vmag.sigma),
+            extinction_mag_per_airmass: has_horizon.then(|| mag(clear.extinction_mag.value)),
+            extinction_sigma_mag: has_horizon.then(|| mag(clear.extinction_mag.sigma)),
+            extinction_measured: has_horizon && clear.is_extinction_measured,
+            edge_loss_mag: mag(clear.edge_loss_mag.value),
+            edge_loss_sigma_mag: mag(clear.edge_loss_mag.sigma),
+            stars: clear.stars,
+            no_brightness: sky.no_brightness.map(|why| why.code()),
+            no_brightness_text: sky.no_brightness.map(|why| why.text()),
+            zenith: sky.zenith.as_ref().map(ZenithReport::new),
+            cloud_share: share(|share| share.value),
+            cloud_share_sigma: share(|share| share.sigma),
+            cells: sky.cells.iter().map(SkyCellReport::new).collect(),
+        }
+    }
+
+    /// Its lines in a text report.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some(zenith) = &self.zenith {
+            lines.push(labelled(
+                "zenith",
+                &format!(
+                    "{:.2} ± {:.2} mag/arcsec² (V), {:.2} mcd/m²; to the eye V {:.1}, Bortle {}",
+                    zenith.mag_arcsec2,
+                    zenith.sigma_mag,
+                    zenith.luminance_mcd_m2,
+                    zenith.naked_eye_limit_vmag,
+                    zenith.bortle
+                ),
+            ));
+        }
+        if let Some(range) = self.range(|cell| cell.mag_arcsec2) {
+            let cells = counted(self.cells.len(), "cell");
+            let [bright, dark] = range;
+            let text = format!("{bright:.2} to {dark:.2} mag/arcsec² (V) in {cells}");
+            lines.push(labelled("sky", &text));
+        }
+        if let Some(why) = self.no_brightness_text {
+            lines.push(labelled("sky", &format!("no brightness: {why}")));
+        }
+        if let (Some(mag), Some(sigma)) =
+            (self.extinction_mag_per_airmass, self.extinction_sigma_mag)
+        {
+            let source = if self.extinction_measured {
+                counted(self.stars, "star")
+            } else {
+                "little is seen of it; mostly as is usual".to_owned()
+            };
+            let text = format!("{mag:.3} ± {sigma:.3} mag per airmass ({source})");
+            lines.push(labelled("extinction", &text));
+        }
+        if let (Some(share), Some(sigma)) = (self.cloud_share, self.cloud_share_sigma) {
+            let text = format!("{:.0} ± {:.0} % of the sky", 100.0 * share, 100.0 * sigma);
+            lines.push(labelled("clouds", &text));
+        }
+        let difference = |cell: &SkyCellReport| {
+            let is_clear = cell.clear.is_some_and(|clear| clear > 0.9);
+            is_clear.then_some(cell.limit_vmag? - cell.expected_limit_vmag?)
+        };
+        let differences: Vec<f64> = self.cells.iter().filter_map(difference).collect();
+        if !differences.is_empty() {
+            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+            let text = format!(
+                "{mean:+.2} mag measured − expected, in {} clear cells",
+                differences.len()
+            );
+            lines.push(labelled("limits", &text));
+        }
+        lines
+    }
+
+    /// The least and the largest value.
+    fn range(&self, value: impl Fn(&SkyCellReport) -> Option<f64>) -> Option<[f64; 2]> {
+        let values = self.cells.iter().filter_map(value).map(|value| [value; 2]);
+        values.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+}
+
+impl ZenithReport {
+    fn new(zenith: &ZenithSky) -> Self {
+        Self {
+            mag_arcsec2: mag(zenith.light.mag_arcsec2.value),
+            sigma_mag: mag(zenith.light.mag_arcsec2.sigma),
+            luminance_mcd_m2: mcd_m2(zenith.light.luminance_cd_m2),
+            naked_eye_limit_vmag: to_decimals(zenith.naked_eye_limit_vmag, 2),
+            bortle: zenith.bortle,
+        }
+    }
+}
+
+impl SkyCellReport {
+    fn new(cell: &SkyCell) -> Self {
+        let degrees = |range: [f64; 2]| Some(range.map(|at| to_decimals(at, HORIZON_DECIMALS)));
+        let pixels = |range: [f64; 2]| Some(range.map(|at| to_decimals(at, PIXEL_DECIMALS)));
+        let (altitude_deg, azimuth_deg, x, y) = match cell.place {
+            Place::Horizon {
+                altitude_deg,
+                azimuth_deg,
+            } => (degrees(altitude_deg), degrees(azimuth_deg), None, None),
+            Place::Frame { x, y } => (None, None, pixels(x), pixels(y)),
+        };
+        let light = cell.light.as_ref();
+        let limit = cell.limit_vmag.as_ref();
+        let extinction = cell.extinction_mag.as_ref();
+        Self {
+            altitude_deg,
+            azimuth_deg,
+            x,
+            y,
+            solid_angle_sr: significant(cell.solid_angle_sr, DIGITS),
+            mag_arcsec2: light.map(|light| mag(light.mag_arcsec2.value)),
+            sigma_mag: light.map(|light| mag(light.mag_arcsec2.sigma)),
+            luminance_mcd_m2: light.map(|light| mcd_m2(light.luminance_cd_m2)),
+            expected: cell.expected,
+            detected: cell.detected,
+            extinction_mag: extinction.map(|extinction| mag(extinction.value)),
+            extinction_sigma_mag: extinction.map(|extinction| mag(extinction.sigma)),
+            clear: cell.clear.map(|clear| to_decimals(clear, SHARE_DECIMALS)),
+            expected_limit_vmag: cell.expected_limit_vmag.map(mag),
+            limit_vmag: limit.map(|limit| mag(limit.value)),
+            limit_sigma_mag: limit.map(|limit| mag(limit.sigma)),
+        }
+    }
+}
+
+/// A luminance in mcd/m².
+fn mcd_m2(luminance_cd_m2: f64) -> f64 {
+    significant(1e3 * luminance_cd_m2, DIGITS).unwrap_or(0.0)
+}

@@ -1,0 +1,157 @@
+//! `starpipe sky` on simulated all-sky frames.
+
+use crate::common::{Ran, number, starpipe};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const DATE: &str = "--date=2024-01-05T01:00:00Z";
+const SITE: &str = "--site=50,10,300";
+/// The zenith then and there, by astropy.
+const ZENITH: [&str; 2] = ["--ra=128.69523", "--dec=50.08408"];
+/// An all-sky camera.
+const CAMERA: [(&str, &str); 7] = [
+    ("width_px", "1200"),
+    ("height_px", "1200"),
+    ("pitch_x_um", "4"),
+    ("pitch_y_um", "4"),
+    ("focal_length_mm", "1.5626"),
+    ("aperture_mm", "2"),
+    ("spot_sigma_px", "0.9"),
+];
+const EXTINCTION_MAG: f64 = 0.17;
+const SKY_MAG: f64 = 20.5;
+
+/// A file that describes the camera.
+fn described(directory: &Path) -> PathBuf {
+    let new = starpipe()
+        .args(["camera", "new", "--preset=imx174-35mm"])
+        .output()
+        .unwrap();
+    let mut text = String::from_utf8(new.stdout).unwrap();
+    for (key, value) in CAMERA {
+        let start = text.find(&format!("\n{key} = ")).unwrap() + 1;
+        let end = start + text[start..].find('\n').unwrap();
+        text.replace_range(start..end, &format!("{key} = {value}"));
+    }
+    text += "\nprojection = \"equidistant\"\nfield_radius_deg = 88\n";
+    let file = directory.join("camera.toml");
+    fs::write(&file, text).unwrap();
+    file
+}
+
+fn simulated(directory: &Path, camera: &Path, more: &[&str]) -> PathBuf {
+    let frame = directory.join("night.tif");
+    let ran = Ran::new(
+        starpipe()
+            .args(["simulate", "--seed=3", "--exposure=20", "--by-altitude=1"])
+            .args([DATE, SITE])
+            .args(ZENITH)
+            .arg(format!("--camera={}", camera.display()))
+            .arg(format!("--extinction={EXTINCTION_MAG}"))
+            .arg(format!("--sky-mag-arcsec2={SKY_MAG}"))
+            .arg(format!("--out={}", frame.display()))
+            .args(more),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    frame
+}
+
+fn sky(frame: &Path, more: &[String]) -> Value {
+    let ran = Ran::new(
+        starpipe()
+            .args(["sky", "--format=json", DATE, SITE])
+            .args(more)
+            .arg(frame),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    ran.reports().remove(0)["sky"].clone()
+}
+
+fn cells<'a>(
+    sky: &'a Value,
+    wanted: impl Fn(&Value) -> bool + 'a,
+) -> impl Iterator<Item = &'a Value> {
+    let cells = sky["cells"].as_array().unwrap().iter();
+    cells.filter(move |cell| wanted(cell))
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum / count
+}
+
+#[test]
+fn a_clear_sky_is_as_bright_and_as_clear_as_it_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let camera = described(directory.path());
+    let frame = simulated(directory.path(), &camera, &[]);
+    let found = sky(&frame, &[format!("--camera={}", camera.display())]);
+    let extinction = number(&found, "/extinction_mag_per_airmass");
+    assert!((extinction - EXTINCTION_MAG).abs() < 0.02, "{extinction}");
+    assert_eq!(found["extinction_measured"], true);
+    // The sky is 0.02 mag brighter over the meter's cone than at the zenith.
+    let zenith = number(&found, "/zenith/mag_arcsec2");
+    assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
+    assert!(number(&found, "/cloud_share") < 0.1);
+    let high = |cell: &Value| number(cell, "/altitude_deg/0") >= 20.0;
+    let off = cells(&found, high).map(|cell| {
+        let altitude_deg =
+            0.5 * (number(cell, "/altitude_deg/0") + number(cell, "/altitude_deg/1"));
+        let sin_sq = altitude_deg.to_radians().cos().powi(2);
+        // Krisciunas & Schaefer 1991, eqs. (2) and (3).
+        let airmass = (1.0 - 0.96 * sin_sq).powf(-0.5);
+        let dimmed_mag = EXTINCTION_MAG * (airmass - 1.0);
+        let expected = SKY_MAG - 2.5 * airmass.log10() + dimmed_mag;
+        number(cell, "/mag_arcsec2") - expected
+    });
+    let off: Vec<f64> = off.collect();
+    let common = mean(off.iter().copied());
+    assert!(common.abs() < 0.06, "{common}");
+    for off in off {
+        assert!((off - common).abs() < 0.05, "{off} {common}");
+    }
+    let limits = cells(&found, high).filter_map(|cell| {
+        Some(cell["limit_vmag"].as_f64()? - cell["expected_limit_vmag"].as_f64()?)
+    });
+    let difference = mean(limits);
+    assert!(difference.abs() < 0.15, "{difference}");
+}
+
+#[test]
+fn without_a_dark_level_there_are_clouds_and_no_brightness() {
+    let directory = tempfile::tempdir().unwrap();
+    let camera = described(directory.path());
+    let clouds = ["--cloud-mag=2", "--cloud-size-px=300", "--cloud-light=0.5"];
+    let frame = simulated(directory.path(), &camera, &clouds);
+    let out = directory.path().join("out");
+    let found = sky(&frame, &[format!("--out={}", out.display())]);
+    assert_eq!(found["no_brightness"], "bias_unknown");
+    assert!(
+        cells(&found, |cell| !cell["mag_arcsec2"].is_null())
+            .next()
+            .is_none()
+    );
+    let share = number(&found, "/cloud_share");
+    assert!((0.25..0.7).contains(&share), "{share}");
+    let extinction = number(&found, "/extinction_mag_per_airmass");
+    assert!((extinction - EXTINCTION_MAG).abs() < 0.06, "{extinction}");
+    let figure = fs::read_to_string(out.join("night.sky.svg")).unwrap();
+    assert!(figure.starts_with("<svg") && figure.contains("Extinction by clouds"));
+    assert!(!figure.contains("Brightness") && !figure.contains("NaN"));
+}
+
+#[test]
+fn a_narrow_field_without_a_site_is_divided_by_columns_and_rows() {
+    let ran = Ran::new(starpipe().args(["sky", "--format=json", "fixtures/orion/orion.png"]));
+    let report = ran.reports().remove(0);
+    let cell = &report["sky"]["cells"][0];
+    assert!(
+        cell["altitude_deg"].is_null() && cell["x"].is_array(),
+        "{cell}"
+    );
+    assert!(report["sky"]["extinction_mag_per_airmass"].is_null());
+    // `process` does not measure it.
+    let ran = Ran::new(starpipe().args(["process", "--format=json", "fixtures/orion/orion.png"]));
+    assert!(ran.reports()[0].get("sky").is_none());
+}
