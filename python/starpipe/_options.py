@@ -83,7 +83,7 @@ class SolveOptions(TypedDict, total=False):
     attitude_only : bool
         Stop at the attitude: no star beyond the brightest is named.
     sky : bool
-        Measure the sky at each place: `Result.sky`.
+        Measure the sky at each place: `Result.sky_map`.
     time_limit : Quantity or float
         How long a frame may take, in seconds. By default as long as it needs.
     """

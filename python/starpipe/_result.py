@@ -220,7 +220,7 @@ class Result(Attitude):
         return self._report["prediction"]  # type: ignore[no-any-return]
 
     @property
-    def sky(self) -> dict[str, Any] | None:
+    def sky_map(self) -> dict[str, Any] | None:
         """The sky at each place, with ``sky=True``: the `sky` of the JSON, magnitudes in V."""
         return self._report.get("sky")  # type: ignore[no-any-return]
 

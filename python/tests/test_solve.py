@@ -140,8 +140,8 @@ def test_attitude_only_names_few(pipeline, pixels, result):
 
 
 def test_the_sky_is_measured_on_demand(pipeline, pixels, result):
-    assert result.sky is None
-    sky = pipeline.solve(pixels, sky=True).sky
+    assert result.sky_map is None
+    sky = pipeline.solve(pixels, sky=True).sky_map
     assert sky["no_brightness"] == "bias_unknown" and len(sky["cells"]) > 20
     assert 0.0 <= sky["cloud_share"] <= 1.0
 
