@@ -49,6 +49,9 @@ process: process --attitude-only --frame-of apparent --date 2026-01-01 fixtures/
 None: process --format csv --out OUT/tables fixtures/orion/orion.png
 process: identify --pixel-scale 113.7 OUT/tables/orion.csv
 process: identify --pixel-scale 10 OUT/tables/orion.csv
+simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
+process: sky --camera docs/start/all-sky.toml --site 47,8,500 OUT/sky.tif
+process: sky fixtures/orion/orion.png
 calibrate: calibrate --site 47,8,500 OUT/night fixtures/regression/no-stars.tif -o OUT/lens.toml
 process: process --camera OUT/lens.toml --site 47,8,500 OUT/night/frame-00000.tif
 track: track --interval 0.1 OUT/still

@@ -2,8 +2,8 @@
 
 use super::background::Mesh;
 use super::pixels::View;
-use super::search::FilterPass;
 use crate::base::coords::PixelPoint;
+use crate::base::statistics::median;
 
 /// The flux at which half of the stars are detected, in parts of the frame.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,14 +15,15 @@ pub(crate) struct FluxLimits {
 }
 
 impl FluxLimits {
-    /// Sets those of a frame that was searched: the threshold over the noise of the filtered frame, which
-    /// edges, clouds and crowds of faint stars raise.
+    /// Sets those of a frame that was searched with a `threshold` over the noise of the filtered frame, which
+    /// edges, clouds and crowds of faint stars raise. A star whose flux is the noise of a pixel has the
+    /// signal-to-noise ratio `gain`.
     pub(super) fn set(
         &mut self,
         view: &View,
-        background: &Mesh,
-        filtered: &Mesh,
-        pass: &FilterPass,
+        [background, filtered]: [&Mesh; 2],
+        threshold: f64,
+        gain: f64,
     ) {
         let grid = &background.grid;
         self.parts = [grid.columns, grid.rows];
@@ -36,8 +37,8 @@ impl FluxLimits {
                 let x = middle(column, grid.columns, view.width);
                 let (_, noise_adu) = background.at(x, y);
                 let (mean, sigma) = filtered.at(x, y);
-                let limit = pass.threshold as f32 * sigma + mean;
-                self.adu.push(limit * noise_adu / pass.matched_gain as f32);
+                let limit = threshold as f32 * sigma + mean;
+                self.adu.push(limit * noise_adu / gain as f32);
             }
         }
     }
@@ -46,6 +47,12 @@ impl FluxLimits {
     pub(super) fn clear(&mut self) {
         self.parts = [0; 2];
         self.adu.clear();
+    }
+
+    /// Their median; `None` where nothing was searched.
+    pub(crate) fn median(&self) -> Option<f64> {
+        let mut limits: Vec<f64> = self.adu.iter().map(|adu| f64::from(*adu)).collect();
+        (!limits.is_empty()).then(|| median(&mut limits))
     }
 
     /// The flux at a place of a frame of this size, in ADU; `None` where nothing was searched.

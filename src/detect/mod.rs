@@ -172,10 +172,11 @@ fn run(
     };
     let searched = search.run(&input)?;
     set_levels(found, background, &searched);
-    let filtered = &search.filtered.mesh;
+    let meshes = [&background.mesh, &search.filtered.mesh];
+    let pass = &searched.pass;
     found
         .flux_limits
-        .set(&view, &background.mesh, filtered, &searched.pass);
+        .set(&view, meshes, pass.threshold, pass.matched_gain);
     if !measure_trails(&input, search, &searched, found)? {
         measure_spots(&input, search, searched, measure, found)?;
     }

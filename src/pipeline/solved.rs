@@ -68,10 +68,6 @@ impl SolvedFrame<'_> {
         let Some(identification) = self.outcome.identification() else {
             return;
         };
-        let zero_point = self
-            .photometry
-            .as_ref()
-            .and_then(|measured| measured.zero_point.as_ref());
         let camera = self.context.camera.as_ref().map(|camera| &camera.sheet);
         let by_camera = camera
             .zip(self.priors.exposure_s)
@@ -83,7 +79,6 @@ impl SolvedFrame<'_> {
         let picture = Picture {
             frame: self.frame,
             dark_adu: if has_dark { Some(0.0) } else { by_camera },
-            linearity: zero_point.and_then(|zero_point| zero_point.linearity),
             is_flat: has_flat || camera.is_some(),
         };
         let frame = self.identified_frame(identification);

@@ -27,6 +27,7 @@ pub mod regions;
 mod sample;
 mod sky;
 pub mod sky_figure;
+mod sky_text;
 mod star_row;
 mod stars;
 pub mod tables;

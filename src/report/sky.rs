@@ -1,8 +1,7 @@
 //! The sky at each place of a frame, in reports.
 
 use super::digits::{HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS, SHARE_DECIMALS};
-use super::text::labelled;
-use crate::base::format::{counted, significant, to_decimals};
+use crate::base::format::{significant, to_decimals};
 use crate::base::statistics::Estimate;
 use crate::photometry::sky_map::{Place, SkyCell, SkyMap, ZenithSky};
 use serde::Serialize;
@@ -42,7 +41,7 @@ pub struct SkyReport {
     /// The parts of the sky.
     pub cells: Vec<SkyCellReport>,
     #[serde(skip)]
-    no_brightness_text: Option<&'static str>,
+    pub(super) no_brightness_text: Option<&'static str>,
 }
 
 /// The brightness at the zenith.
@@ -127,68 +126,6 @@ impl SkyReport {
             cloud_share_sigma: share(|share| share.sigma),
             cells: sky.cells.iter().map(SkyCellReport::new).collect(),
         }
-    }
-
-    /// Its lines in a text report.
-    pub(super) fn lines(&self) -> Vec<String> {
-        let mut lines = Vec::new();
-        if let Some(zenith) = &self.zenith {
-            lines.push(labelled(
-                "zenith",
-                &format!(
-                    "{:.2} ± {:.2} mag/arcsec² (V), {:.2} mcd/m²; to the eye V {:.1}, Bortle {}",
-                    zenith.mag_arcsec2,
-                    zenith.sigma_mag,
-                    zenith.luminance_mcd_m2,
-                    zenith.naked_eye_limit_vmag,
-                    zenith.bortle
-                ),
-            ));
-        }
-        if let Some(range) = self.range(|cell| cell.mag_arcsec2) {
-            let cells = counted(self.cells.len(), "cell");
-            let [bright, dark] = range;
-            let text = format!("{bright:.2} to {dark:.2} mag/arcsec² (V) in {cells}");
-            lines.push(labelled("sky", &text));
-        }
-        if let Some(why) = self.no_brightness_text {
-            lines.push(labelled("sky", &format!("no brightness: {why}")));
-        }
-        if let (Some(mag), Some(sigma)) =
-            (self.extinction_mag_per_airmass, self.extinction_sigma_mag)
-        {
-            let source = if self.extinction_measured {
-                counted(self.stars, "star")
-            } else {
-                "little is seen of it; mostly as is usual".to_owned()
-            };
-            let text = format!("{mag:.3} ± {sigma:.3} mag per airmass ({source})");
-            lines.push(labelled("extinction", &text));
-        }
-        if let (Some(share), Some(sigma)) = (self.cloud_share, self.cloud_share_sigma) {
-            let text = format!("{:.0} ± {:.0} % of the sky", 100.0 * share, 100.0 * sigma);
-            lines.push(labelled("clouds", &text));
-        }
-        let difference = |cell: &SkyCellReport| {
-            let is_clear = cell.clear.is_some_and(|clear| clear > 0.9);
-            is_clear.then_some(cell.limit_vmag? - cell.expected_limit_vmag?)
-        };
-        let differences: Vec<f64> = self.cells.iter().filter_map(difference).collect();
-        if !differences.is_empty() {
-            let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-            let text = format!(
-                "{mean:+.2} mag measured − expected, in {} clear cells",
-                differences.len()
-            );
-            lines.push(labelled("limits", &text));
-        }
-        lines
-    }
-
-    /// The least and the largest value.
-    fn range(&self, value: impl Fn(&SkyCellReport) -> Option<f64>) -> Option<[f64; 2]> {
-        let values = self.cells.iter().filter_map(value).map(|value| [value; 2]);
-        values.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 }
 

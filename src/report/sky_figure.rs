@@ -4,26 +4,39 @@ use super::frame_report::FrameReport;
 use super::sky::{SkyCellReport, SkyReport};
 use crate::base::format::xml_escaped;
 use crate::base::units::RAD_PER_DEG;
+use memchr::memmem;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// Radius of a sky, in units of the figure.
 const RADIUS: f64 = 150.0;
 /// Width of a panel.
 const PANEL: f64 = 380.0;
 /// Height of the figure.
-const HEIGHT: f64 = 470.0;
+const HEIGHT: f64 = 490.0;
 /// Height of the centre of a sky.
-const MIDDLE: f64 = 215.0;
+const MIDDLE: f64 = 238.0;
 /// Steps of the color bar.
 const BAR_STEPS: usize = 40;
 /// Points along the side of a cell at most 5° long.
 const SIDE_POINTS: usize = 4;
+
+/// Says what the figure is.
+const COMMENT: &str = "<!-- starpipe sky -->";
+
+/// Whether a file that begins like this is such a figure.
+pub fn is_figure(head: &[u8]) -> bool {
+    memmem::find(head, COMMENT.as_bytes()).is_some()
+}
 
 /// One picture of the sky.
 struct Panel {
     title: &'static str,
     unit: &'static str,
     value: fn(&SkyCellReport) -> Option<f64>,
+    /// Whether low values are light: bright skies have low magnitudes.
+    is_low_light: bool,
     /// Bounds of the colors; `None` for those of the values.
     bounds: Option<[f64; 2]>,
     decimals: usize,
@@ -34,6 +47,7 @@ const PANELS: [Panel; 3] = [
         title: "Brightness",
         unit: "V magnitude of a square arcsecond",
         value: |cell| cell.mag_arcsec2,
+        is_low_light: true,
         bounds: None,
         decimals: 1,
     },
@@ -41,6 +55,7 @@ const PANELS: [Panel; 3] = [
         title: "Extinction by clouds",
         unit: "magnitudes beyond clear air",
         value: |cell| cell.extinction_mag,
+        is_low_light: false,
         bounds: Some([0.0, 2.0]),
         decimals: 1,
     },
@@ -48,6 +63,7 @@ const PANELS: [Panel; 3] = [
         title: "Limit, measured − expected",
         unit: "magnitudes",
         value: |cell| Some(cell.limit_vmag? - cell.expected_limit_vmag?),
+        is_low_light: false,
         bounds: Some([-1.0, 1.0]),
         decimals: 1,
     },
@@ -64,7 +80,7 @@ pub fn svg(report: &FrameReport) -> Option<String> {
     let width = PANEL * shown.len().max(1) as f64;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {HEIGHT}\" width=\"{width}\" \
-         height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"13\">\n\
+         height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"13\">\n{COMMENT}\n\
          <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
          <text x=\"16\" y=\"26\" font-size=\"16\">{}</text>\n",
         xml_escaped(&title(report, sky))
@@ -84,7 +100,9 @@ pub fn svg(report: &FrameReport) -> Option<String> {
 
 /// The result in words.
 fn title(report: &FrameReport, sky: &SkyReport) -> String {
-    let mut parts = vec![report.frame.clone()];
+    let name = Path::new(&report.frame).file_name();
+    let name = name.map_or(report.frame.as_str().into(), OsStr::to_string_lossy);
+    let mut parts = vec![name.into_owned()];
     if let Some(zenith) = &sky.zenith {
         parts.push(format!("zenith V {:.2} mag/arcsec²", zenith.mag_arcsec2));
     }
@@ -101,6 +119,15 @@ fn title(report: &FrameReport, sky: &SkyReport) -> String {
 }
 
 impl Panel {
+    /// The color of a value from 0 to 1 between the bounds.
+    fn color(&self, value: f64) -> String {
+        color(if self.is_low_light {
+            1.0 - value
+        } else {
+            value
+        })
+    }
+
     fn draw(&self, out: &mut String, report: &FrameReport, sky: &SkyReport) {
         let values = sky.cells.iter().filter_map(self.value);
         let range = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
@@ -118,7 +145,7 @@ impl Panel {
                 continue;
             };
             let span = (bounds[1] - bounds[0]).max(1e-9);
-            let color = color((value - bounds[0]) / span);
+            let color = self.color((value - bounds[0]) / span);
             let outline = outline(cell, report);
             let _ = writeln!(
                 out,
@@ -142,7 +169,7 @@ impl Panel {
                 "<rect x=\"{:.1}\" y=\"{top}\" width=\"{:.1}\" height=\"12\" fill=\"{}\"/>",
                 left + i as f64 * step,
                 step + 0.5,
-                color((i as f64 + 0.5) / BAR_STEPS as f64),
+                self.color((i as f64 + 0.5) / BAR_STEPS as f64),
             );
         }
         let decimals = self.decimals;

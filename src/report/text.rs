@@ -4,7 +4,6 @@ use super::frame_report::{
     AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
     ObservationReport, OpticsReport, PhotometryReport, StarReport, Status,
 };
-use super::sky::SkyReport;
 use crate::base::format::{self, counted, decimals_for, printable};
 use crate::base::remedy::{OptionNames, Remedy};
 use crate::base::units::ARCSEC_PER_RAD;
@@ -50,7 +49,9 @@ impl FrameReport {
         let magnitude = self.magnitude.as_ref();
         let predicted = self.prediction.iter();
         lines.extend(predicted.flat_map(|prediction| prediction.lines(magnitude)));
-        lines.extend(self.sky.iter().flat_map(SkyReport::lines));
+        if let Some(sky) = &self.sky {
+            lines.extend(sky.lines());
+        }
         lines.push(self.date_line(options.option_names));
         lines.extend(self.observation.iter().map(observation_line));
         lines.extend(self.calibration.iter().map(calibration_line));

@@ -76,13 +76,11 @@ pub struct ZenithSky {
     pub bortle: u8,
 }
 
-/// Light and noise of a cell.
+/// Light and threshold of a cell.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct CellLevel {
     /// Solid angle of the sky in it, in steradians.
     pub solid_angle_sr: f64,
-    /// Noise of a pixel, in ADU.
-    pub noise_adu: f64,
     /// Flux at which half of the stars are detected, in ADU.
     pub limit_adu: f64,
     /// Airmass, where the horizon is known.
@@ -101,11 +99,11 @@ struct Sum {
     solid_angle_sr: f64,
 }
 
-/// Light and noise of all cells.
+/// Light and threshold of all cells.
 pub(super) struct Levels {
     /// Each of them.
     pub cells: Vec<CellLevel>,
-    /// Flux of the noise of a pixel is over this time.
+    /// Fluxes are over this time.
     pub exposure_s: f64,
     /// The light about the zenith, weighted as a meter sees it.
     zenith: Sum,
@@ -114,14 +112,12 @@ pub(super) struct Levels {
 }
 
 /// What the sums of a cell need.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 struct CellSums {
     samples: f64,
     off_centre_sq: f64,
     airmass: f64,
     limit_adu: f64,
-    /// Differences of pixels two columns apart.
-    differences_adu: Vec<f32>,
 }
 
 impl Levels {
@@ -147,11 +143,8 @@ impl Levels {
             zenith_sr: 0.0,
         };
         let mut sums = vec![CellSums::default(); grid.places.len()];
-        let (mut row, mut background_row) = (vec![0.0_f32; width], vec![0.0; width]);
+        let mut background_row = vec![0.0; width];
         for y in (step / 2..height).step_by(step) {
-            for (x, value) in row.iter_mut().enumerate() {
-                *value = picture.frame.pixels.value(y * width + x);
-            }
             background.row(y, &mut background_row);
             for x in (step / 2..width).step_by(step) {
                 let pixel = PixelPoint::new(x as f64, y as f64);
@@ -179,10 +172,6 @@ impl Levels {
                 let size_px = [camera.width_px, camera.height_px];
                 let limit_adu = frame.detections.flux_limits.at(&pixel, size_px);
                 sum.limit_adu += limit_adu.unwrap_or(f64::NAN);
-                let block = x - step / 2..(x + step / 2 + 1).min(width.saturating_sub(2));
-                let differences = block.map(|x| (row[x + 2] - row[x]).abs());
-                sum.differences_adu
-                    .extend(differences.filter(|d| !d.is_nan()));
                 if let Some(zenith) = frame.places.zenith() {
                     let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
                     levels.zenith.add(weight, light_adu, seen_sr);
@@ -195,7 +184,6 @@ impl Levels {
             level.limit_adu = sum.limit_adu / sum.samples;
             let airmass = sum.airmass / sum.samples;
             level.airmass = Some(airmass).filter(|airmass| !airmass.is_nan());
-            level.noise_adu = noise_of(sum.differences_adu);
         }
         levels
     }
@@ -250,13 +238,8 @@ impl Sum {
 }
 
 /// Why the brightness of a frame cannot be measured.
-pub(super) fn refusal(picture: &Picture) -> Option<NoBrightness> {
-    /// Air and clouds make a slope, too, but a small one: tone curves make a large one.
-    const LARGEST_SLOPE: f64 = 0.1;
-    let has_tone_curve = picture
-        .linearity
-        .is_some_and(|linearity| (linearity.value - 1.0).abs() > LARGEST_SLOPE);
-    if has_tone_curve {
+pub(super) fn refusal(picture: &Picture, clear_sky: &ClearSky) -> Option<NoBrightness> {
+    if clear_sky.has_tone_curve() {
         Some(NoBrightness::NotLinear)
     } else if picture.dark_adu.is_none() {
         Some(NoBrightness::BiasUnknown)
@@ -274,17 +257,6 @@ fn solid_angle_sr(grid: &Grid, pixel: &PixelPoint) -> Option<f64> {
     let across = at(0.5, 0.0)? - at(-0.5, 0.0)?;
     let down = at(0.0, 0.5)? - at(0.0, -0.5)?;
     Some(across.cross(&down).norm())
-}
-
-/// The noise of a pixel from differences between pixels; stars are among the largest.
-fn noise_of(mut differences_adu: Vec<f32>) -> f64 {
-    /// Share of the differences that count, and their mean for noise of 1.
-    const KEPT: f64 = 0.9;
-    const MEAN: f64 = 0.6574;
-    differences_adu.sort_unstable_by(f32::total_cmp);
-    let kept = (KEPT * differences_adu.len() as f64) as usize;
-    let sum: f64 = differences_adu[..kept].iter().map(|d| f64::from(*d)).sum();
-    sum / kept as f64 / MEAN / 2.0_f64.sqrt()
 }
 
 /// How a meter weighs what is this far from the zenith.
@@ -347,23 +319,5 @@ mod tests {
         assert!((naked_eye_limit_vmag(21.6) - 6.5).abs() < 0.1);
         assert!((naked_eye_limit_vmag(18.0) - 4.0).abs() < 0.3);
         assert_eq!([22.0, 21.6, 21.0, 19.0, 17.0].map(bortle), [1, 2, 4, 6, 9]);
-    }
-
-    #[test]
-    fn noise_is_that_of_most_differences() {
-        // The quantiles of a normal distribution with a standard deviation of 3√2.
-        let normal = |i: i32| {
-            let p = (f64::from(i) + 0.5) / 4000.0;
-            let mut z = 0.0_f64;
-            for _ in 0..60 {
-                let off = crate::base::statistics::normal_cdf(z) - p;
-                z -= off / crate::base::statistics::normal_density(z).max(1e-3);
-            }
-            (3.0 * 2.0_f64.sqrt() * z).abs() as f32
-        };
-        let mut differences: Vec<f32> = (0..4000).map(normal).collect();
-        assert!((noise_of(differences.clone()) - 3.0).abs() < 0.02);
-        differences[..100].fill(500.0);
-        assert!((noise_of(differences) - 3.0).abs() < 0.15);
     }
 }

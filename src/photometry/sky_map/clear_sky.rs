@@ -1,10 +1,11 @@
 //! The air without clouds: the zero point outside the atmosphere, and extinction per airmass.
 //!
 //! ```text
-//! V = Z + m + c (B−V − 0.6) − k X − a ρ² − b ρ⁴
+//! V = Z + m + c (B−V − 0.6) − k X − a ρ² − b ρ⁴ + s (V − V̄)
 //! ```
 //!
-//! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field. What is known of
+//! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field; s is 0 where gray
+//! levels are proportional to light, and V̄ is the mean of the stars. What is known of
 //! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars,
 //! so the relation is that of the brightest ones: stars well below it are left out, round by round.
 
@@ -13,11 +14,12 @@ use crate::base::statistics::{Estimate, median};
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use nalgebra::{SMatrix, SVector};
 
-/// Unknowns: Z, c, k, a, b.
-const UNKNOWNS: usize = 5;
+/// Unknowns: Z, c, k, a, b, s.
+const UNKNOWNS: usize = 6;
 const COLOR: usize = 1;
 const EXTINCTION: usize = 2;
 const VIGNETTING: [usize; 2] = [3, 4];
+const SLOPE: usize = 5;
 /// Extinction in V, in magnitudes per airmass, and how it differs from place to place and night to night
 /// (Patat et al. 2011, A&A 527, A91, for Paranal: 0.12; 0.2 to 0.3 near sea level).
 const USUAL_EXTINCTION: Estimate = Estimate {
@@ -39,11 +41,14 @@ const USUAL_LOSS: [Estimate; 2] = [
 ];
 /// The same where a flat did, or the loss is stated.
 const FLAT_SIGMA_MAG: f64 = 0.01;
+/// Slopes of gray levels with a tone curve.
+const USUAL_SLOPE_SIGMA: f64 = 0.3;
 /// Least number of stars.
-const MIN_STARS: usize = 12;
+const MIN_STARS: usize = 20;
 /// Stars for which a larger error is expected are left out: they are brightened by being detected. A choice
 /// by the error that they have would prefer those that noise makes brighter.
-const LARGEST_SIGMA_MAG: f64 = 0.1;
+/// Where they are too few, fainter ones count.
+const LARGEST_SIGMAS_MAG: [f64; 2] = [0.1, 0.25];
 
 /// The air without clouds, and the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +65,8 @@ pub struct ClearSky {
     pub color_term: Estimate,
     /// Magnitudes by which stars at the edge of the field are dimmer than at its centre.
     pub edge_loss_mag: Estimate,
+    /// Part of a magnitude that is missing in the frame: 0 where gray levels are proportional to light.
+    pub slope: Estimate,
     /// Standard deviation of a bright star about the relation.
     pub scatter_mag: f64,
     /// Number of stars.
@@ -67,6 +74,8 @@ pub struct ClearSky {
     /// Whether airmasses are known.
     pub has_horizon: bool,
     unknowns: [f64; UNKNOWNS],
+    /// V̄.
+    mean_vmag: f64,
     /// Error of the zero point seen through one airmass.
     ground_sigma_mag: f64,
 }
@@ -87,13 +96,18 @@ struct Candidate {
 }
 
 impl Candidate {
-    fn of(star: &SkyStar) -> Option<Self> {
+    fn of(star: &SkyStar, mean_vmag: f64) -> Option<Self> {
         let Measured {
             instrumental_mag,
             sigma_mag,
         } = star.measured?;
         Some(Self {
-            row: SVector::from(row_of(star.airmass, star.off_centre_sq, star.bv_mag)),
+            row: SVector::from(row_of(
+                star.airmass,
+                star.off_centre_sq,
+                star.bv_mag,
+                star.v_mag - mean_vmag,
+            )),
             offset_mag: star.v_mag - instrumental_mag,
             sigma_mag,
         })
@@ -110,53 +124,69 @@ impl Candidate {
     }
 
     /// Whether it belongs to the clear sky of a fit.
-    fn is_kept(&self, fit: &Fit, scatter_mag: f64) -> bool {
+    fn is_kept(&self, fit: &Fit, scatter_mag: f64, largest_mag: f64) -> bool {
         /// Stars this far below the relation are behind clouds, or variable,
         const LOW_SIGMAS: f64 = 2.5;
         /// and this far above it something else.
         const HIGH_SIGMAS: f64 = 4.0;
         let expected_mag = self.expected_sigma_mag(fit);
         let off = self.residual_mag(fit) / expected_mag.hypot(scatter_mag);
-        expected_mag < LARGEST_SIGMA_MAG && (-LOW_SIGMAS..HIGH_SIGMAS).contains(&off)
+        expected_mag < largest_mag && (-LOW_SIGMAS..HIGH_SIGMAS).contains(&off)
     }
 }
 
 impl ClearSky {
     /// Measures it; `None` with too few stars.
     pub(super) fn of(stars: &[SkyStar], is_flat: bool) -> Option<Self> {
-        const ROUNDS: usize = 30;
-        /// Scatter of stars, in magnitudes, in the first round and at most.
-        const FIRST_SCATTER_MAG: f64 = 0.2;
-        const MOST_SCATTER_MAG: f64 = 0.5;
-        let candidates: Vec<Candidate> = stars.iter().filter_map(Candidate::of).collect();
-        let mut fit = Fit::first(&candidates, is_flat)?;
-        let (mut scatter_mag, mut used) = (FIRST_SCATTER_MAG, 0);
-        for _ in 0..ROUNDS {
-            let kept = |star: &&Candidate| star.is_kept(&fit, scatter_mag);
-            let kept: Vec<&Candidate> = candidates.iter().filter(kept).collect();
-            if kept.len() < MIN_STARS {
-                return None;
-            }
-            let next = Fit::of(&kept, &fit, scatter_mag, is_flat)?;
-            let next_scatter_mag = scatter(&kept, &next).min(MOST_SCATTER_MAG);
-            let is_settled = kept.len() == used && (next_scatter_mag - scatter_mag).abs() < 1e-4;
-            (fit, scatter_mag, used) = (next, next_scatter_mag, kept.len());
-            if is_settled {
-                break;
-            }
-        }
+        let measured = || stars.iter().filter(|star| star.measured.is_some());
+        let sum: f64 = measured().map(|star| star.v_mag).sum();
+        let mean_vmag = sum / measured().count().max(1) as f64;
+        let candidate = |star| Candidate::of(star, mean_vmag);
+        let candidates: Vec<Candidate> = stars.iter().filter_map(candidate).collect();
         let has_horizon = stars.iter().any(|star| star.airmass.is_some());
-        Some(fit.clear_sky(scatter_mag, used, has_horizon))
+        let fitted = |largest_mag| Fit::of_clear_sky(&candidates, largest_mag, is_flat);
+        let (fit, scatter_mag, used) = LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)?;
+        Some(fit.clear_sky(scatter_mag, used, has_horizon, mean_vmag))
     }
 
-    /// The relation's Z − k X − a ρ² − b ρ⁴ + c (B−V − 0.6), at a place and for a star of a color.
-    pub(super) fn zero_point_at(
+    /// The instrumental magnitude of a star in clear air.
+    pub(super) fn instrumental_mag(&self, star: &SkyStar) -> f64 {
+        let above_mean_mag = star.v_mag - self.mean_vmag;
+        let row = row_of(
+            star.airmass,
+            star.off_centre_sq,
+            star.bv_mag,
+            above_mean_mag,
+        );
+        star.v_mag - self.dot(row)
+    }
+
+    /// The V magnitude of a star of B−V 0.6 in clear air, by its instrumental one.
+    pub(super) fn v_mag(
         &self,
         airmass: Option<f64>,
         off_centre_sq: f64,
-        bv_mag: Option<f64>,
+        instrumental_mag: f64,
     ) -> f64 {
-        let row = row_of(airmass, off_centre_sq, bv_mag);
+        let slope = self.unknowns[SLOPE];
+        let row = row_of(airmass, off_centre_sq, None, -self.mean_vmag);
+        (instrumental_mag + self.dot(row)) / (1.0 - slope)
+    }
+
+    /// By how many magnitudes a star is dimmer than in clear air, from its instrumental magnitude.
+    pub(super) fn dimmer_mag(&self, star: &SkyStar, instrumental_mag: f64) -> f64 {
+        (instrumental_mag - self.instrumental_mag(star)) / (1.0 - self.unknowns[SLOPE])
+    }
+
+    /// Whether gray levels have a tone curve.
+    pub(super) fn has_tone_curve(&self) -> bool {
+        const LEAST_SLOPE: f64 = 0.1;
+        const SIGMAS: f64 = 3.0;
+        let Estimate { value, sigma } = self.slope;
+        value.abs() > LEAST_SLOPE.max(SIGMAS * sigma)
+    }
+
+    fn dot(&self, row: [f64; UNKNOWNS]) -> f64 {
         row.iter().zip(self.unknowns).map(|(a, b)| a * b).sum()
     }
 
@@ -194,7 +224,12 @@ fn scatter(stars: &[&Candidate], fit: &Fit) -> f64 {
 }
 
 /// The derivatives of the relation by the unknowns.
-fn row_of(airmass: Option<f64>, off_centre_sq: f64, bv_mag: Option<f64>) -> [f64; UNKNOWNS] {
+fn row_of(
+    airmass: Option<f64>,
+    off_centre_sq: f64,
+    bv_mag: Option<f64>,
+    above_mean_mag: f64,
+) -> [f64; UNKNOWNS] {
     [
         1.0,
         bv_mag.map_or(0.0, |bv_mag| bv_mag - REFERENCE_BV_MAG),
@@ -202,6 +237,7 @@ fn row_of(airmass: Option<f64>, off_centre_sq: f64, bv_mag: Option<f64>) -> [f64
         -airmass.unwrap_or(0.0),
         -off_centre_sq,
         -off_centre_sq * off_centre_sq,
+        above_mean_mag,
     ]
 }
 
@@ -220,20 +256,49 @@ impl Fit {
             USUAL_EXTINCTION,
             first,
             second,
+            of(0.0, USUAL_SLOPE_SIGMA),
         ]
     }
 
+    /// The fit to the stars that are not dimmed and have at most this expected error, their scatter, and their
+    /// number. `None` if they are too few.
+    fn of_clear_sky(
+        candidates: &[Candidate],
+        largest_mag: f64,
+        is_flat: bool,
+    ) -> Option<(Self, f64, usize)> {
+        const ROUNDS: usize = 30;
+        /// Scatter of stars, in magnitudes, in the first round and at most.
+        const FIRST_SCATTER_MAG: f64 = 0.2;
+        const MOST_SCATTER_MAG: f64 = 0.5;
+        let mut fit = Self::first(candidates, largest_mag, is_flat)?;
+        let (mut scatter_mag, mut used) = (FIRST_SCATTER_MAG, 0);
+        for _ in 0..ROUNDS {
+            let kept = |star: &&Candidate| star.is_kept(&fit, scatter_mag, largest_mag);
+            let kept: Vec<&Candidate> = candidates.iter().filter(kept).collect();
+            if kept.len() < MIN_STARS {
+                return None;
+            }
+            let next = Self::of(&kept, &fit, scatter_mag, is_flat)?;
+            let next_scatter_mag = scatter(&kept, &next).min(MOST_SCATTER_MAG);
+            let is_settled = kept.len() == used && (next_scatter_mag - scatter_mag).abs() < 1e-4;
+            (fit, scatter_mag, used) = (next, next_scatter_mag, kept.len());
+            if is_settled {
+                break;
+            }
+        }
+        Some((fit, scatter_mag, used))
+    }
+
     /// The relation of experience, as high as the brightest of the stars ask for.
-    fn first(stars: &[Candidate], is_flat: bool) -> Option<Self> {
+    fn first(stars: &[Candidate], largest_mag: f64, is_flat: bool) -> Option<Self> {
         /// Share of the stars above it.
         const TOP: f64 = 0.3;
         let mut fit = Self {
             unknowns: SVector::from(Self::experience(is_flat).map(|known| known.value)),
             covariance: SMatrix::zeros(),
         };
-        let bright = stars
-            .iter()
-            .filter(|star| star.sigma_mag < LARGEST_SIGMA_MAG);
+        let bright = stars.iter().filter(|star| star.sigma_mag < largest_mag);
         let mut above: Vec<f64> = bright.map(|star| star.residual_mag(&fit)).collect();
         above.sort_unstable_by(|a, b| b.total_cmp(a));
         fit.unknowns[0] += above.get((TOP * above.len() as f64) as usize)?;
@@ -265,14 +330,21 @@ impl Fit {
         row.dot(&(self.covariance * row)).max(0.0)
     }
 
-    fn clear_sky(&self, scatter_mag: f64, stars: usize, has_horizon: bool) -> ClearSky {
+    fn clear_sky(
+        &self,
+        scatter_mag: f64,
+        stars: usize,
+        has_horizon: bool,
+        mean_vmag: f64,
+    ) -> ClearSky {
         /// Part of what experience leaves open that a measured extinction leaves.
         const MEASURED: f64 = 0.5;
         let estimate = |unknown: usize| Estimate {
             value: self.unknowns[unknown],
             sigma: self.covariance[(unknown, unknown)].max(0.0).sqrt(),
         };
-        let edge = SVector::from(row_of(None, 1.0, None)) - SVector::from(row_of(None, 0.0, None));
+        let edge = SVector::from(row_of(None, 1.0, None, 0.0))
+            - SVector::from(row_of(None, 0.0, None, 0.0));
         let extinction_mag = estimate(EXTINCTION);
         ClearSky {
             zero_point_vmag: estimate(0),
@@ -283,12 +355,14 @@ impl Fit {
                 value: -self.unknowns.dot(&edge),
                 sigma: self.variance(&edge).sqrt(),
             },
+            slope: estimate(SLOPE),
             scatter_mag,
             stars,
             has_horizon,
+            mean_vmag,
             unknowns: self.unknowns.into(),
             ground_sigma_mag: self
-                .variance(&SVector::from(row_of(None, 0.0, None)))
+                .variance(&SVector::from(row_of(None, 0.0, None, 0.0)))
                 .sqrt(),
         }
     }

@@ -21,6 +21,8 @@ const CLEAR_SIGMA_MAG: f64 = 0.05;
 const CLOUD_VARIATION: f64 = 0.3;
 /// Share of stars whose brightness or presence tells nothing: variable stars, wrong names.
 const UNTRUE: f64 = 0.02;
+/// Weight of the stars that tell of a cell at least: without any, nothing is known of it.
+const LEAST_WEIGHT: f64 = 0.3;
 /// Stars that should be detected with at least this probability count as expected.
 const EXPECTED: f64 = 0.9;
 
@@ -49,24 +51,26 @@ impl Sky<'_> {
         let of_cell = |cell: usize| {
             let mut clouds = CellClouds::default();
             let mut total = [0.0; STEPS];
-            let mut used = 0;
+            let mut told = 0.0;
             for (witness, logs) in witnesses.iter().zip(&logs) {
                 let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
                     continue;
                 };
-                used += 1;
                 for (total, log) in total.iter_mut().zip(logs) {
                     *total += weight * log;
                 }
                 let is_expected = limit
                     .as_ref()
                     .is_some_and(|limit| limit.probability(witness.relative_mag) > EXPECTED);
+                if is_expected || witness.star.measured.is_some() {
+                    told += weight;
+                }
                 if witness.cell == cell && is_expected {
                     clouds.expected += 1;
                     clouds.detected += usize::from(witness.star.is_detected);
                 }
             }
-            if used > 0 && self.depths[cell].is_some() {
+            if told > LEAST_WEIGHT && self.depths[cell].is_some() {
                 let (clear, extinction_mag) = posterior(&total);
                 clouds.clear = Some(clear);
                 clouds.extinction_mag = Some(extinction_mag);
@@ -88,9 +92,7 @@ impl Sky<'_> {
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
             let likelihood = match (star.measured, star.is_detected) {
                 (Some(measured), _) => {
-                    let zero_point =
-                        clear.zero_point_at(star.airmass, star.off_centre_sq, star.bv_mag);
-                    let dimmer_mag = measured.instrumental_mag + zero_point - star.v_mag;
+                    let dimmer_mag = clear.dimmer_mag(star, measured.instrumental_mag);
                     let own_mag = measured.sigma_mag.hypot(clear.scatter_mag);
                     let sigma_mag = own_mag.hypot(CLOUD_VARIATION * extinction_mag);
                     let off = (dimmer_mag - extinction_mag) / sigma_mag;

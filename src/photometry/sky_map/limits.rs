@@ -1,5 +1,5 @@
-//! How faint stars go at each place, and how faint they should go: by the camera's description with the
-//! noise there, or without one by the threshold there and the clear parts of the frame.
+//! How faint stars go at each place, and how faint they should go: by the threshold there, and the limit of
+//! the whole frame by the camera's description, or without one that of the clear parts of the frame.
 
 use super::clouds::CellClouds;
 use super::witnesses::{Sky, Witness};
@@ -35,9 +35,12 @@ pub(super) fn limits(
         .map(|witness| counted(witness, witness.relative_mag))
         .collect();
     let own = completeness::measure(&relative, sky.chance).limit.ok();
-    let over_noise = stated_vmag.map(|limit_vmag| limit_vmag - sky.typical_noise_vmag());
+    let by_model = stated_vmag
+        .zip(sky.typical_depth_vmag())
+        .map(|(limit, typical)| limit - typical);
+    let over_depth = by_model.or(own.map(|own| own.v_mag));
     let of_cell = |cell: usize| {
-        let Some(depth) = sky.depths[cell] else {
+        let Some(depth_vmag) = sky.depths[cell] else {
             return CellLimits::default();
         };
         let near: Vec<CountedStar> = witnesses
@@ -49,11 +52,7 @@ pub(super) fn limits(
             .then(|| completeness::measure(&near, sky.chance).limit.ok())
             .flatten();
         CellLimits {
-            expected_vmag: match (over_noise, &own) {
-                (Some(over), _) => Some(over + depth.noise_vmag),
-                (None, Some(own)) => Some(own.v_mag + depth.threshold_vmag),
-                (None, None) => None,
-            },
+            expected_vmag: over_depth.map(|over| over + depth_vmag),
             measured_vmag: measured.map(|limit| Estimate {
                 value: limit.v_mag,
                 sigma: limit.sigma_mag,

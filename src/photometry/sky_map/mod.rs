@@ -11,7 +11,7 @@
 //!    probability that it is hardly any (`clouds`).
 //! 4. The background above the bias, over the solid angle of a pixel, is the sky's brightness
 //!    (`brightness`).
-//! 5. The noise and the extinction of a cell tell how faint its stars should go, and the stars around it
+//! 5. The threshold and the extinction of a cell tell how faint its stars should go, and the stars around it
 //!    how faint they go (`limits`).
 //!
 //! Caveats: a frame's band is not V. The zero point is that of stars; the sky has another color, and its
@@ -116,7 +116,7 @@ pub fn measure(
     };
     let clouds = sky.clouds();
     let limits = limits::limits(&sky, &clouds, expected_limit_vmag);
-    let no_brightness = brightness::refusal(picture);
+    let no_brightness = brightness::refusal(picture, &clear_sky);
     let light = |cell: usize| match no_brightness {
         None => levels.light(cell, &clear_sky),
         Some(_) => None,

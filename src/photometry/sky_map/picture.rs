@@ -1,6 +1,5 @@
 //! The pixels in which the sky is measured.
 
-use crate::base::statistics::Estimate;
 use crate::frame::Frame;
 
 /// A frame's pixels, and what is known of their levels.
@@ -10,9 +9,6 @@ pub struct Picture<'a> {
     pub frame: &'a Frame<'a>,
     /// Level of a pixel without light, in ADU, where it is known.
     pub dark_adu: Option<f64>,
-    /// Instrumental magnitudes per magnitude of V, with air and clouds: 1 where gray levels are proportional
-    /// to light.
-    pub linearity: Option<Estimate>,
     /// Whether the loss of light towards the corners is known, and was removed or is stated.
     pub is_flat: bool,
 }

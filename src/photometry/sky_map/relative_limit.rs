@@ -20,9 +20,7 @@ impl RelativeLimit {
         let is_dimmed = |witness: &&Witness| {
             let star = witness.star;
             star.measured.is_some_and(|measured| {
-                let zero_point =
-                    clear_sky.zero_point_at(star.airmass, star.off_centre_sq, star.bv_mag);
-                let dimmer_mag = measured.instrumental_mag + zero_point - star.v_mag;
+                let dimmer_mag = clear_sky.dimmer_mag(star, measured.instrumental_mag);
                 dimmer_mag > DIMMED_SIGMAS * measured.sigma_mag.hypot(clear_sky.scatter_mag)
             })
         };

@@ -1,12 +1,10 @@
 //! The stars as witnesses of the sky in which they are.
 
 use super::clear_sky::ClearSky;
-use super::depth::Depth;
 use super::grid::Grid;
 use super::stars::SkyStar;
 use crate::detect::Detections;
 use crate::photometry::instrumental_mag;
-use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use crate::sky::places::StarPlaces;
 
 /// What is known of the sky before clouds.
@@ -18,7 +16,7 @@ pub(super) struct Sky<'a> {
     /// The air without clouds.
     pub clear_sky: &'a ClearSky,
     /// How faint stars go in each cell.
-    pub depths: &'a [Option<Depth>],
+    pub depths: &'a [Option<f64>],
     /// Where stars appear.
     pub places: StarPlaces,
     /// What was detected.
@@ -40,15 +38,14 @@ pub(super) struct Witness<'a> {
 }
 
 impl Sky<'_> {
-    /// V magnitude of a star at the frame's centre whose flux is the typical noise of a pixel: for these the
-    /// limit of the whole frame is predicted.
-    pub(super) fn typical_noise_vmag(&self) -> f64 {
+    /// V magnitude of a star in clear air at the frame's centre and at the typical threshold: for these the
+    /// limit of the whole frame is predicted. `None` where nothing was searched.
+    pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
+        let limit_adu = self.detections.flux_limits.median()?;
         let center = self.grid.direction_of(&self.grid.camera().centre());
         let airmass = center.and_then(|center| self.places.airmass(&center));
-        let noise_adu = self.detections.noise_adu;
-        self.clear_sky
-            .zero_point_at(airmass, 0.0, Some(REFERENCE_BV_MAG))
-            + instrumental_mag(noise_adu / self.exposure_s)
+        let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
+        Some(self.clear_sky.v_mag(airmass, 0.0, limit_mag))
     }
 
     /// The stars in cells whose depth is known.
@@ -62,14 +59,11 @@ impl Sky<'_> {
         let camera = self.grid.camera();
         let limits = &self.detections.flux_limits;
         let limit_adu = limits.at(&star.pixel, [camera.width_px, camera.height_px])?;
-        let zero_point =
-            self.clear_sky
-                .zero_point_at(star.airmass, star.off_centre_sq, star.bv_mag);
-        let limit_vmag = zero_point + instrumental_mag(limit_adu / self.exposure_s);
+        let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
         Some(Witness {
             star,
             cell,
-            relative_mag: star.v_mag - limit_vmag,
+            relative_mag: -self.clear_sky.dimmer_mag(star, limit_mag),
         })
     }
 }
