@@ -93,7 +93,8 @@ fn a_clear_sky_is_as_bright_and_as_clear_as_it_is() {
     // The sky is 0.02 mag brighter over the meter's cone than at the zenith.
     let zenith = number(&found, "/zenith/mag_arcsec2");
     assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
-    assert!(number(&found, "/cloud_share") < 0.1);
+    // A few cells with few stars may be behind clouds.
+    assert!(number(&found, "/cloud_share") < 0.2);
     let high = |cell: &Value| number(cell, "/altitude_deg/0") >= 20.0;
     let off = cells(&found, high).map(|cell| {
         let altitude_deg =
