@@ -222,7 +222,7 @@ class Result(Attitude):
     @property
     def sky_map(self) -> dict[str, Any] | None:
         """The sky at each place, with ``sky=True``: the `sky` of the JSON, magnitudes in V."""
-        return self._report.get("sky")  # type: ignore[no-any-return]
+        return self._report.get("sky")
 
     @property
     def timing(self) -> dict[str, float]:
