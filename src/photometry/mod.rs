@@ -137,16 +137,45 @@ fn standard_star(
         .identification
         .camera
         .off_centre_sq(&detection.position);
-    let flux_adu = detection.flux_adu
-        / (1.0 + star.neighbors_light)
-        / lens_transmission(frame.vignetting, off_centre_sq);
+    let Measured {
+        instrumental_mag,
+        sigma_mag,
+    } = Measured::of(frame, star, detection, off_centre_sq);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,
         bv_mag: known.bv_mag.map(f64::from),
-        instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
-        sigma_mag: MAG_PER_RELATIVE / detection.snr,
+        instrumental_mag,
+        sigma_mag,
         off_centre_sq,
     })
+}
+
+/// A star's brightness in a frame.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without its neighbors' light and what the
+    /// lens takes.
+    instrumental_mag: f64,
+    /// Its standard error.
+    sigma_mag: f64,
+}
+
+impl Measured {
+    /// That of a detection at this distance from the centre.
+    fn of(
+        frame: &IdentifiedFrame,
+        star: &FrameStar,
+        detection: &Detection,
+        off_centre_sq: f64,
+    ) -> Self {
+        let flux_adu = detection.flux_adu
+            / (1.0 + star.neighbors_light)
+            / lens_transmission(frame.vignetting, off_centre_sq);
+        Self {
+            instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
+            sigma_mag: MAG_PER_RELATIVE / detection.snr,
+        }
+    }
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.

@@ -106,6 +106,11 @@ impl NodeLine {
     }
 }
 
+/// How far the middle one of three backgrounds is off the line through the others, twice.
+fn bend([before, here, after]: [f32; 3]) -> f32 {
+    (before - 2.0 * here + after).abs()
+}
+
 /// Raises noise to at least `floor`.
 fn raise(sigma: &mut [f32], floor: f32) {
     for sigma in sigma {
@@ -203,8 +208,8 @@ impl Mesh {
             .copied()
             .fold(f32::INFINITY, f32::min);
         let is_edge = |cell: usize, step: usize| {
-            let around = [cell - step, cell, cell + step].map(|at| self.background[at]);
-            let bend = (around[0] - 2.0 * around[1] + around[2]).abs();
+            let around = self.around(cell, step);
+            let bend = bend(around);
             let brightest = around.into_iter().fold(f32::NEG_INFINITY, f32::max);
             bend >= (share * (brightest - darkest)).max(self.sigma[cell])
         };
@@ -216,6 +221,11 @@ impl Mesh {
         })
     }
 
+    /// The background of a cell between those `step` cells before and after it.
+    fn around(&self, cell: usize, step: usize) -> [f32; 3] {
+        [cell - step, cell, cell + step].map(|at| self.background[at])
+    }
+
     /// Whether the background bends near a place by more than `sigmas` times the noise of a pixel.
     pub fn is_bent_at(&self, x: f32, y: f32, sigmas: f32) -> bool {
         let CellGrid { columns, rows, .. } = self.grid;
@@ -225,11 +235,8 @@ impl Mesh {
         );
         let inner = |at: usize, count: usize| at.max(2) - 1..(at + 2).min(count.saturating_sub(1));
         let (row, column) = (at / columns, at % columns);
-        let bends = |cell: usize, step: usize| {
-            let [before, here, after] =
-                [cell - step, cell, cell + step].map(|at| self.background[at]);
-            (before - 2.0 * here + after).abs() > sigmas * self.sigma[cell]
-        };
+        let bends =
+            |cell: usize, step: usize| bend(self.around(cell, step)) > sigmas * self.sigma[cell];
         let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         near(row, rows).any(|y| inner(column, columns).any(|x| bends(y * columns + x, 1)))
             || inner(row, rows)

@@ -8,6 +8,7 @@ use crate::base::coords::PixelPoint;
 use crate::base::statistics::Estimate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::BackgroundMap;
+use crate::model::sensitivity::SkyBrightness;
 use crate::photometry::{IdentifiedFrame, instrumental_mag};
 use std::f64::consts::PI;
 
@@ -232,7 +233,7 @@ impl Sum {
                 value: mag,
                 sigma: zero_point.sigma.hypot(by_color_mag),
             },
-            luminance_cd_m2: luminance_cd_m2(mag),
+            luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
         })
     }
 }
@@ -281,15 +282,6 @@ fn meter_solid_angle_sr() -> f64 {
     2.0 * PI * step_rad * (0..STEPS).map(ring).sum::<f64>()
 }
 
-/// The luminance of a sky of this brightness.
-///
-/// # Reference
-/// The convention of makers of meters: 10.8e4 cd/m² at V = 0 in a square arcsecond. By the spectrum of the
-/// sky it is up to 30 % more (Bará et al. 2020, MNRAS 493, 2429).
-fn luminance_cd_m2(mag_arcsec2: f64) -> f64 {
-    10.8e4 * libm::pow(10.0, -0.4 * mag_arcsec2)
-}
-
 /// The faintest star for the unaided eye.
 ///
 /// # Reference
@@ -315,7 +307,8 @@ mod tests {
 
     #[test]
     fn brightness_in_other_units() {
-        assert!((luminance_cd_m2(21.6) * 1e3 - 0.247).abs() < 0.001);
+        let luminance_cd_m2 = SkyBrightness::MagArcsec2(21.6).luminance_cd_m2();
+        assert!((luminance_cd_m2 * 1e3 - 0.247).abs() < 0.001);
         assert!((naked_eye_limit_vmag(21.6) - 6.5).abs() < 0.1);
         assert!((naked_eye_limit_vmag(18.0) - 4.0).abs() < 0.3);
         assert_eq!([22.0, 21.6, 21.0, 19.0, 17.0].map(bortle), [1, 2, 4, 6, 9]);

@@ -9,8 +9,9 @@
 //! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars,
 //! so the relation is that of the brightest ones: stars well below it are left out, round by round.
 
-use super::stars::{Measured, SkyStar};
+use super::stars::SkyStar;
 use crate::base::statistics::{Estimate, median};
+use crate::photometry::Measured;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use nalgebra::{SMatrix, SVector};
 

@@ -41,9 +41,8 @@ pub(super) struct CellClouds {
 
 impl Sky<'_> {
     /// Clouds in each cell.
-    pub(super) fn clouds(&self) -> Vec<CellClouds> {
-        let witnesses = self.witnesses();
-        let limit = RelativeLimit::of_clear_sky(&witnesses, self.clear_sky, self.chance);
+    pub(super) fn clouds(&self, witnesses: &[Witness]) -> Vec<CellClouds> {
+        let limit = RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance);
         let logs: Vec<[f64; STEPS]> = witnesses
             .iter()
             .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
@@ -84,16 +83,18 @@ impl Sky<'_> {
     fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
         let star = witness.star;
         let clear = self.clear_sky;
+        let measured = star.measured.map(|measured| {
+            let dimmer_mag = clear.dimmer_mag(star, measured.instrumental_mag);
+            (dimmer_mag, measured.sigma_mag.hypot(clear.scatter_mag))
+        });
         std::array::from_fn(|step| {
             let extinction_mag = step as f64 * STEP_MAG;
             let seen = limit.map_or(1.0, |limit| {
                 limit.probability(witness.relative_mag + extinction_mag)
             });
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
-            let likelihood = match (star.measured, star.is_detected) {
-                (Some(measured), _) => {
-                    let dimmer_mag = clear.dimmer_mag(star, measured.instrumental_mag);
-                    let own_mag = measured.sigma_mag.hypot(clear.scatter_mag);
+            let likelihood = match (measured, star.is_detected) {
+                (Some((dimmer_mag, own_mag)), _) => {
                     let sigma_mag = own_mag.hypot(CLOUD_VARIATION * extinction_mag);
                     let off = (dimmer_mag - extinction_mag) / sigma_mag;
                     let agrees = libm::exp(-0.5 * off * off) / sigma_mag;

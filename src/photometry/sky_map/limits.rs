@@ -18,12 +18,12 @@ pub(super) struct CellLimits {
 /// The limits of each cell. `stated_vmag` is the limit of the whole frame by the camera's description.
 pub(super) fn limits(
     sky: &Sky,
+    witnesses: &[Witness],
     clouds: &[CellClouds],
     stated_vmag: Option<f64>,
 ) -> Vec<CellLimits> {
     /// Stars of a limit.
     const MIN_STARS: usize = 20;
-    let witnesses = sky.witnesses();
     let is_clear = |cell: usize| clouds[cell].clear.is_some_and(|clear| clear > 0.5);
     let counted = |witness: &Witness, v_mag: f64| CountedStar {
         v_mag,

@@ -114,8 +114,9 @@ pub fn measure(
         exposure_s: levels.exposure_s,
         chance: association.chance,
     };
-    let clouds = sky.clouds();
-    let limits = limits::limits(&sky, &clouds, expected_limit_vmag);
+    let witnesses = sky.witnesses();
+    let clouds = sky.clouds(&witnesses);
+    let limits = limits::limits(&sky, &witnesses, &clouds, expected_limit_vmag);
     let no_brightness = brightness::refusal(picture, &clear_sky);
     let light = |cell: usize| match no_brightness {
         None => levels.light(cell, &clear_sky),

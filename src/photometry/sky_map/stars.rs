@@ -1,12 +1,9 @@
 //! The stars by which the sky is measured.
 
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
-use crate::camera::data_sheet::lens_transmission;
 use crate::identify::{IndexedCatalog, PredictedStar};
 use crate::photometry::association::Association;
-use crate::photometry::{
-    IdentifiedFrame, MAG_PER_RELATIVE, instrumental_mag, is_constant_and_single,
-};
+use crate::photometry::{IdentifiedFrame, Measured, is_constant_and_single};
 
 /// A star that the frame should show, alone at its place.
 #[derive(Debug, Clone, Copy)]
@@ -27,15 +24,6 @@ pub(super) struct SkyStar {
     pub is_detected: bool,
     /// Its brightness in the frame, where that is clean.
     pub measured: Option<Measured>,
-}
-
-/// A star's brightness in the frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Measured {
-    /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without what the lens takes.
-    pub instrumental_mag: f64,
-    /// Its standard error.
-    pub sigma_mag: f64,
 }
 
 /// The stars of a frame that are alone at their places.
@@ -61,17 +49,7 @@ pub(super) fn of(
             });
             let measured = clean
                 .filter(|detection| detection.flux_adu > 0.0)
-                .map(|detection| {
-                    let flux_adu = detection.flux_adu
-                        / (1.0 + star.neighbors_light)
-                        / lens_transmission(frame.vignetting, off_centre_sq);
-                    Measured {
-                        instrumental_mag: instrumental_mag(
-                            flux_adu / frame.exposure_s.unwrap_or(1.0),
-                        ),
-                        sigma_mag: MAG_PER_RELATIVE / detection.snr,
-                    }
-                });
+                .map(|detection| Measured::of(frame, star, detection, off_centre_sq));
             let direction = frame.places.of(known);
             SkyStar {
                 direction,
