@@ -275,7 +275,7 @@ impl Distortion {
     }
 
     /// [`Self::apply`], with the derivatives.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn observe(&self, ideal: [f64; 2]) -> Option<Observed> {
         let c = self.normalized();
         let offset = self.before_fold(ideal)?;

@@ -84,19 +84,26 @@ const STUDY: [&str; 25] = [
     "threads",
 ];
 
-/// The program with help on one screen for `-h`.
-pub(super) fn of(mut program: Command) -> Command {
-    for (name, shown) in SHOWN {
-        program = program.mut_subcommand(name, |command| with_options(command, &shown.concat()));
-    }
+/// The program with help on one screen for `-h`. A command is changed when it is called: to change all
+/// takes longer than a frame.
+pub(super) fn of(program: Command) -> Command {
     let names: Vec<String> = program
         .get_subcommands()
         .map(|c| c.get_name().to_owned())
         .collect();
-    for name in names {
-        program = program.mut_subcommand(name, with_few_examples);
-    }
-    program
+    names.into_iter().fold(program, |program, name| {
+        program.mut_subcommand(name, |command| command.defer(shortened))
+    })
+}
+
+/// The command with its short help.
+fn shortened(command: Command) -> Command {
+    let shown = SHOWN.iter().find(|(name, _)| *name == command.get_name());
+    let command = match shown {
+        Some((_, shown)) => with_options(command, &shown.concat()),
+        None => command,
+    };
+    with_few_examples(command)
 }
 
 /// The command with these options alone, and the beginning of what is said of each.

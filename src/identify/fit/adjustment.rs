@@ -153,7 +153,7 @@ pub(crate) struct Predictor {
     camera: CameraModel,
     /// ICRS to the axes of its lens.
     icrs_to_lens: Rotation<Icrs, Camera>,
-    /// Its distortion; without one, a model with all terms 0.
+    /// Its distortion, with all the terms of lenses; those that it lacks are 0.
     distortion: Distortion,
 }
 
@@ -193,13 +193,17 @@ impl Predictor {
         icrs_to_camera: &Rotation<Icrs, Camera>,
         model: Option<DistortionModel>,
     ) -> Self {
-        let zero = Distortion::zero(DistortionModel::Irregular5, camera.radius_px());
+        let of_lenses = DistortionModel::Stretched;
+        let whole = model.map_or(of_lenses, |model| model.max(of_lenses));
         let of_model = |distortion: &Distortion| model.map(|model| distortion.of_model(model));
         let known = camera.distortion().and_then(of_model);
         let mut predictor = Self {
             camera: *camera,
             icrs_to_lens: *icrs_to_camera,
-            distortion: known.map_or(zero, |known| known.of_model(DistortionModel::Irregular5)),
+            distortion: known.map_or_else(
+                || Distortion::zero(whole, camera.radius_px()),
+                |known| known.of_model(whole),
+            ),
         };
         predictor.set_lens(camera.focal_length_px(), predictor.distortion, model);
         let to_lens = predictor.camera.lens_axes();
