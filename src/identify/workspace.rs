@@ -476,9 +476,46 @@ fn with_names(
             break;
         }
     }
-    let best = best?;
+    let best = named_outwards(problem, search, best?, most_chance);
     search.restore_pairs();
     Some((best.refined, best.log10))
+}
+
+/// The fit of a lens that images more of the frame than the named stars are in, as long as it names
+/// more; the search keeps these names.
+fn named_outwards(
+    problem: Problem,
+    search: &mut Search,
+    mut best: Named,
+    most_chance: f64,
+) -> Named {
+    /// Largest distance of true pairs, in diagonals of the frame.
+    const RADIUS_SHARE: f64 = 0.002;
+    const MAX_ROUNDS: usize = 3;
+    let field = problem.field;
+    for _ in 0..MAX_ROUNDS {
+        search.restore_pairs();
+        let followed = search.followed_outwards(problem, &best.refined);
+        let settled = followed.and_then(|hypothesis| {
+            let start = Start {
+                hypothesis: &hypothesis,
+                radius_px: RADIUS_SHARE * field.width_px.hypot(field.height_px),
+                sceptical: false,
+                stars: hypothesis.fitted_stars,
+                richest: DistortionModel::Irregular5,
+            };
+            search.refiner().refine(problem, &start)
+        });
+        let named = settled.and_then(|settled| name(problem, search, &settled, most_chance));
+        match named {
+            Some(named) if named.names > best.names => {
+                search.keep_pairs();
+                best = named;
+            }
+            _ => break,
+        }
+    }
+    best
 }
 
 /// A fit to the stars with sure names.

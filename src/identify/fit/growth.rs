@@ -10,12 +10,13 @@
 use super::adjustment::{
     Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor, robust_sigma_px,
 };
+use super::lens_choice::with_projection;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::neighbors::PointGrid;
 use crate::base::statistics::{log10_binomial_tail, median};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, DistortionModel, Projection};
-use crate::identify::field::Photometry;
+use crate::identify::field::{Photometry, StarField};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::identification::MIN_STARS;
 use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings};
@@ -42,7 +43,7 @@ const MIN_SIGMA_PX: f64 = 0.3;
 const STEP_RAD: f64 = 6.0 * RAD_PER_DEG;
 /// Rounds without a step outwards after which there is none.
 const MAX_STALLED: usize = 3;
-/// Fits of the stars of the window in which outliers lose weight.
+/// Fits of the stars of the seed in which outliers lose weight.
 const ROBUST_ROUNDS: usize = 3;
 /// Maximum rounds of pairing and fitting.
 const MAX_ROUNDS: usize = 40;
@@ -53,14 +54,47 @@ const RING_RAD: f64 = 4.0 * RAD_PER_DEG;
 /// Largest log10 of the probability that as many stars of a ring agree by chance.
 const LOG10_CHANCE: f64 = -2.0;
 
-/// What is known of a window of the frame.
+/// What is known of a part of the frame.
 pub struct Seed<'a> {
     /// Its stars, at their places in the whole frame.
-    pub stars: &'a [MeasuredStar],
-    /// Its centre, in pixels of the whole frame.
-    pub centre: PixelPoint,
-    /// Its camera and attitude, with the window as the frame.
-    pub hypothesis: &'a Hypothesis,
+    stars: &'a [MeasuredStar],
+    /// The direction of its middle.
+    centre: UnitVector<Icrs>,
+    /// A lens of the angle that images it about so, of the whole frame, and its attitude.
+    camera: CameraModel,
+    icrs_to_camera: Rotation<Icrs, Camera>,
+    zero_point_mag: f64,
+}
+
+impl<'a> Seed<'a> {
+    /// A window around `centre` of a frame, with the window's camera and attitude.
+    pub fn of_window(
+        frame: &StarField,
+        centre: PixelPoint,
+        of_window: &Hypothesis,
+        stars: &'a [MeasuredStar],
+    ) -> Self {
+        let (camera, icrs_to_camera) = start(frame, centre, of_window);
+        Self {
+            stars,
+            centre: of_window.icrs_to_camera.boresight(),
+            camera,
+            icrs_to_camera,
+            zero_point_mag: of_window.zero_point_mag,
+        }
+    }
+
+    /// The part of a frame around its middle in which `stars` are.
+    pub fn of_middle(of_frame: &Hypothesis, stars: &'a [MeasuredStar]) -> Self {
+        let (camera, icrs_to_camera) = with_projection(of_frame, Projection::Equidistant);
+        Self {
+            stars,
+            centre: of_frame.icrs_to_camera.boresight(),
+            camera: camera.limited_to(MAX_ANGLE_RAD),
+            icrs_to_camera,
+            zero_point_mag: of_frame.zero_point_mag,
+        }
+    }
 }
 
 /// Follows lenses outwards. Its buffers are reused.
@@ -79,8 +113,8 @@ pub struct Growth {
 struct ExpectedStar {
     /// Its angle from the axis, in radians.
     from_axis_rad: f64,
-    /// Its angle from the centre of the window, in radians.
-    from_window_rad: f64,
+    /// Its angle from the middle of the seed, in radians.
+    from_seed_rad: f64,
     /// Probability that a detection is there by chance.
     chance: f64,
     is_found: bool,
@@ -101,7 +135,7 @@ struct Fitted {
 }
 
 impl Growth {
-    /// The lens of the whole frame, as far as the stars show it. `None` where the stars of the window do
+    /// The lens of the whole frame, as far as the stars show it. `None` where the stars of the seed do
     /// not determine one.
     pub fn grow(&mut self, problem: Problem, seed: &Seed) -> Option<Hypothesis> {
         let field = problem.field;
@@ -110,8 +144,7 @@ impl Growth {
         self.detections.fill(field.stars.len(), positions);
         self.stars.clear();
         self.stars.extend_from_slice(seed.stars);
-        let (camera, icrs_to_camera) = start(problem, seed);
-        let mut fitted = fit(&self.stars, &camera, &icrs_to_camera)?;
+        let mut fitted = fit(&self.stars, &seed.camera, &seed.icrs_to_camera)?;
         for _ in 0..ROBUST_ROUNDS {
             for (star, of_seed) in self.stars.iter_mut().zip(seed.stars) {
                 let seen = fitted.icrs_to_camera.apply(&star.icrs);
@@ -120,7 +153,7 @@ impl Growth {
             }
             fitted = fit(&self.stars, &fitted.camera, &fitted.icrs_to_camera)?;
         }
-        let mut zero_point_mag = seed.hypothesis.zero_point_mag;
+        let mut zero_point_mag = seed.zero_point_mag;
         let mut reach = reach_of(seed);
         let mut stalled = 0;
         for _ in 0..MAX_ROUNDS {
@@ -129,7 +162,7 @@ impl Growth {
                 break;
             };
             fitted = next;
-            let known_rad = self.known_to_rad(|star| star.from_window_rad)?;
+            let known_rad = self.known_to_rad(|star| star.from_seed_rad)?;
             if known_rad + STEP_RAD > reach.radius_rad {
                 reach.radius_rad = known_rad + STEP_RAD;
                 stalled = 0;
@@ -179,8 +212,8 @@ impl Growth {
         self.expected.clear();
         self.differences_mag.clear();
         for star in self.predicted.iter().take(MAX_PREDICTED) {
-            let from_window_rad = star.direction.angle_to(&reach.centre);
-            if from_window_rad > reach.radius_rad {
+            let from_seed_rad = star.direction.angle_to(&reach.centre);
+            if from_seed_rad > reach.radius_rad {
                 continue;
             }
             let direction = fitted.icrs_to_camera.apply(&star.direction);
@@ -198,7 +231,7 @@ impl Growth {
             let found = self.nearest(problem, &hypothesis, star, radius_px);
             self.expected.push(ExpectedStar {
                 from_axis_rad: direction.angle_to(&UnitVector::BORESIGHT),
-                from_window_rad,
+                from_seed_rad,
                 chance,
                 is_found: found.is_some(),
             });
@@ -283,9 +316,9 @@ impl Fitted {
     }
 }
 
-/// The window, and a step around it.
+/// The seed, and a step around it.
 fn reach_of(seed: &Seed) -> Reach {
-    let centre = seed.hypothesis.icrs_to_camera.boresight();
+    let centre = seed.centre;
     let angles = seed.stars.iter().map(|star| star.icrs.angle_to(&centre));
     Reach {
         centre,
@@ -295,15 +328,19 @@ fn reach_of(seed: &Seed) -> Reach {
 
 /// Where to start from: a lens of the angle with the scale of the window, on whose axis the frame's
 /// centre is.
-fn start(problem: Problem, seed: &Seed) -> (CameraModel, Rotation<Icrs, Camera>) {
-    let (field, window) = (problem.field, &seed.hypothesis.camera);
+fn start(
+    field: &StarField,
+    centre: PixelPoint,
+    of_window: &Hypothesis,
+) -> (CameraModel, Rotation<Icrs, Camera>) {
+    let window = &of_window.camera;
     let scale_px = window.central_focal_length_px();
     let camera = |focal_px: f64| {
         CameraModel::pinhole(field.width_px, field.height_px, focal_px, window.mirrored)
             .with_projection(Projection::Equidistant)
             .limited_to(MAX_ANGLE_RAD)
     };
-    let [u, v] = camera(scale_px).offset_of(&seed.centre);
+    let [u, v] = camera(scale_px).offset_of(&centre);
     let radius_px = libm::hypot(u, v);
     // Along the circle around the axis the scale is larger by θ / sin θ.
     let angle_rad = radius_px / scale_px;
@@ -321,9 +358,12 @@ fn start(problem: Problem, seed: &Seed) -> (CameraModel, Rotation<Icrs, Camera>)
     let out = looks(0.0, 0.0);
     let right = looks(0.5, 0.0) - looks(-0.5, 0.0);
     let right = (right - out * out.dot(&right)).normalize();
-    let of_window = Matrix3::from_columns(&[right, out.cross(&right), out]);
-    let icrs_to_window = seed.hypothesis.icrs_to_camera.matrix();
-    (camera, Rotation::from_matrix(of_window * icrs_to_window))
+    let window_to_camera = Matrix3::from_columns(&[right, out.cross(&right), out]);
+    let icrs_to_window = of_window.icrs_to_camera.matrix();
+    (
+        camera,
+        Rotation::from_matrix(window_to_camera * icrs_to_window),
+    )
 }
 
 /// Fits all parameters to the stars.

@@ -13,11 +13,11 @@ use super::tiers::Tiers;
 use super::unseen::Unseen;
 use super::votes::{Vote, Votes};
 use super::windows::Window;
-use crate::base::coords::Rotation;
+use crate::base::coords::{Rotation, UnitVector};
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
 use crate::identify::effort::Effort;
-use crate::identify::field::StarField;
+use crate::identify::field::{ObservedStar, StarField};
 use crate::identify::fit::{Growth, MeasuredStar, POSE_PARAMETERS, Refined, Refiner, Seed, Start};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
@@ -183,12 +183,53 @@ impl<'a> Search<'a> {
                 sigma_px: star.sigma_px.hypot(refined.excess_sigma_px).max(1e-3),
             }
         }));
-        let seed = Seed {
-            stars: seed,
-            centre: window.centre(),
-            hypothesis: &refined.hypothesis(),
-        };
+        let seed = Seed::of_window(whole.field, window.centre(), &refined.hypothesis(), seed);
         growth.grow(whole, &seed)
+    }
+
+    /// The lens of an answer whose named stars the refiner has, followed from the middle of the frame once
+    /// more. `None` where few detections are farther out than the named stars: these last ones were named
+    /// where the lens predicts them, and can hold it there.
+    pub fn followed_outwards(&mut self, problem: Problem, answer: &Refined) -> Option<Hypothesis> {
+        /// Detections farther out than the named stars, over these, below which they are no reason.
+        const LEAST_BEYOND: f64 = 0.05;
+        /// The part of the named stars, as an angle from the axis, that the lens is followed from.
+        const MIDDLE: f64 = 0.9;
+        let hypothesis = answer.hypothesis();
+        let Hypothesis {
+            camera,
+            icrs_to_camera,
+            ..
+        } = &hypothesis;
+        let SearchBuffers {
+            refiner,
+            growth,
+            seed,
+            ..
+        } = &mut *self.buffers;
+        let angle_rad = |pair: &Pair| {
+            let direction = icrs_to_camera.apply(&pair.direction);
+            direction.angle_to(&UnitVector::BORESIGHT)
+        };
+        let outermost_rad = refiner.pairs.iter().map(angle_rad).fold(0.0, f64::max);
+        let stars = &problem.field.stars;
+        let is_beyond = |star: &&ObservedStar| {
+            let direction = camera.direction_of(&star.position);
+            direction.is_none_or(|seen| seen.angle_to(&UnitVector::BORESIGHT) > outermost_rad)
+        };
+        let beyond = stars.iter().filter(is_beyond).count();
+        if camera.is_pinhole() || (beyond as f64) < LEAST_BEYOND * refiner.pairs.len() as f64 {
+            return None;
+        }
+        seed.clear();
+        let of_middle = refiner.pairs.iter();
+        let of_middle = of_middle.filter(|pair| angle_rad(pair) < MIDDLE * outermost_rad);
+        seed.extend(of_middle.map(|pair| MeasuredStar {
+            pixel: stars[pair.observed].position,
+            icrs: pair.direction,
+            sigma_px: stars[pair.observed].sigma_px.hypot(answer.excess_sigma_px),
+        }));
+        growth.grow(problem, &Seed::of_middle(&hypothesis, seed))
     }
 
     /// A hypothesis that was not found by a triangle, fitted to the stars of the field; `None` where
