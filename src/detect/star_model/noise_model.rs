@@ -22,6 +22,10 @@ const SIGNIFICANT_SIGMA: f64 = 2.0;
 const MAX_SQUARED_SIGMA: f32 = 4.0;
 /// The mean of squared standard Gaussians that are cut off there.
 const CUT_OFF_MEAN: f32 = 0.920_5;
+/// Fewest electrons that fill the scale of gray levels. A small pixel holds some thousands, of which the
+/// highest gain of a camera uses about a fiftieth. Spots whose form is not that of the model, as of
+/// pictures with a tone curve, would appear as more noise than that.
+const FEWEST_ELECTRONS: f64 = 50.0;
 /// Rounds of the least squares.
 const NOISE_ROUNDS: usize = 3;
 
@@ -79,6 +83,8 @@ pub(crate) fn star_model(
         });
         buffers.batch = batch;
         model = sums.solve();
+        let most_adu = f64::from(maps.saturation_adu) / FEWEST_ELECTRONS;
+        model.shot_adu = model.shot_adu.min(most_adu);
     }
     StarModel {
         spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),

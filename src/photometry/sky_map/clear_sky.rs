@@ -49,7 +49,7 @@ const MIN_STARS: usize = 20;
 /// Stars for which a larger error is expected are left out: they are brightened by being detected. A choice
 /// by the error that they have would prefer those that noise makes brighter.
 /// Where they are too few, fainter ones count.
-const LARGEST_SIGMAS_MAG: [f64; 2] = [0.1, 0.25];
+const LARGEST_SIGMAS_MAG: [f64; 3] = [0.1, 0.25, 0.6];
 
 /// The air without clouds, and the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +74,8 @@ pub struct ClearSky {
     pub stars: usize,
     /// Whether airmasses are known.
     pub has_horizon: bool,
+    /// The errors of all stars.
+    errors: StarErrors,
     unknowns: [f64; UNKNOWNS],
     /// V̄.
     mean_vmag: f64,
@@ -85,6 +87,23 @@ pub struct ClearSky {
 struct Fit {
     unknowns: SVector<f64, UNKNOWNS>,
     covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+}
+
+/// What the magnitudes of stars in clear air scatter, beside what is stated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct StarErrors {
+    /// The error by the star's own flux, over the stated one. Less than 1 in pictures whose spots have
+    /// another form than the model: their stated errors contain what this makes of a pixel.
+    scale: f64,
+    /// Scatter beyond these errors.
+    scatter_mag: f64,
+}
+
+impl StarErrors {
+    /// The error of a magnitude with this stated one.
+    fn of(&self, sigma_mag: f64) -> f64 {
+        (self.scale * sigma_mag).hypot(self.scatter_mag)
+    }
 }
 
 /// A star by which it may be measured.
@@ -125,13 +144,13 @@ impl Candidate {
     }
 
     /// Whether it belongs to the clear sky of a fit.
-    fn is_kept(&self, fit: &Fit, scatter_mag: f64, largest_mag: f64) -> bool {
+    fn is_kept(&self, fit: &Fit, errors: &StarErrors, largest_mag: f64) -> bool {
         /// Stars this far below the relation are behind clouds, or variable,
         const LOW_SIGMAS: f64 = 2.5;
         /// and this far above it something else.
         const HIGH_SIGMAS: f64 = 4.0;
         let expected_mag = self.expected_sigma_mag(fit);
-        let off = self.residual_mag(fit) / expected_mag.hypot(scatter_mag);
+        let off = self.residual_mag(fit) / errors.of(expected_mag);
         expected_mag < largest_mag && (-LOW_SIGMAS..HIGH_SIGMAS).contains(&off)
     }
 }
@@ -146,8 +165,20 @@ impl ClearSky {
         let candidates: Vec<Candidate> = stars.iter().filter_map(candidate).collect();
         let has_horizon = stars.iter().any(|star| star.airmass.is_some());
         let fitted = |largest_mag| Fit::of_clear_sky(&candidates, largest_mag, is_flat);
-        let (fit, scatter_mag, used) = LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)?;
-        Some(fit.clear_sky(scatter_mag, used, has_horizon, mean_vmag))
+        let (fit, errors, used) = LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)?;
+        Some(fit.clear_sky(errors, used, has_horizon, mean_vmag))
+    }
+
+    /// By how many magnitudes a star is dimmer than in clear air, and the standard error of that.
+    pub(super) fn dimmed_by(&self, star: &SkyStar) -> Option<Estimate> {
+        let Measured {
+            instrumental_mag,
+            sigma_mag,
+        } = star.measured?;
+        Some(Estimate {
+            value: self.dimmer_mag(star, instrumental_mag),
+            sigma: self.errors.of(sigma_mag),
+        })
     }
 
     /// The instrumental magnitude of a star in clear air.
@@ -174,7 +205,7 @@ impl ClearSky {
         (instrumental_mag + self.dot(row)) / (1.0 - slope)
     }
 
-    /// By how many magnitudes a star is dimmer than in clear air, from its instrumental magnitude.
+    /// By how many magnitudes a star of this instrumental magnitude would be dimmer than in clear air.
     pub(super) fn dimmer_mag(&self, star: &SkyStar, instrumental_mag: f64) -> f64 {
         (instrumental_mag - self.instrumental_mag(star)) / (1.0 - self.unknowns[SLOPE])
     }
@@ -207,21 +238,32 @@ impl ClearSky {
     }
 }
 
-/// The scatter of stars beyond their errors. Only what is above the relation is noise alone.
-fn scatter(stars: &[&Candidate], fit: &Fit) -> f64 {
+/// The errors of stars. Only what is above the relation is noise alone.
+fn errors_of(stars: &[&Candidate], fit: &Fit) -> StarErrors {
     /// Least scatter of a star: its catalogue magnitude and its pixels.
     const LEAST_MAG: f64 = 0.01;
+    const MOST_MAG: f64 = 0.5;
     /// Standard deviation of normal noise over its median size.
     const PER_MEDIAN: f64 = 1.4826;
+    /// Stated errors too large by less than this are right.
+    const LARGEST_SCALE: f64 = 0.8;
     let above = stars.iter().filter(|star| star.residual_mag(fit) > 0.0);
-    let excess = |star: &&Candidate| {
-        (PER_MEDIAN * star.residual_mag(fit)).powi(2) - star.expected_sigma_mag(fit).powi(2)
-    };
-    let mut excess: Vec<f64> = above.map(excess).collect();
-    if excess.is_empty() {
-        return LEAST_MAG;
+    let pairs = above.map(|star| {
+        let seen_mag = PER_MEDIAN * star.residual_mag(fit);
+        (seen_mag, star.expected_sigma_mag(fit))
+    });
+    let median_of = |values: &mut Vec<f64>| (!values.is_empty()).then(|| median(values));
+    let mut ratios: Vec<f64> = pairs.clone().map(|(seen, stated)| seen / stated).collect();
+    let scale = median_of(&mut ratios).unwrap_or(1.0);
+    let scale = if scale < LARGEST_SCALE { scale } else { 1.0 };
+    let mut excess: Vec<f64> = pairs
+        .map(|(seen, stated)| seen.powi(2) - (scale * stated).powi(2))
+        .collect();
+    let scatter_mag2 = median_of(&mut excess).unwrap_or(0.0);
+    StarErrors {
+        scale,
+        scatter_mag: scatter_mag2.max(LEAST_MAG.powi(2)).sqrt().min(MOST_MAG),
     }
-    median(&mut excess).max(LEAST_MAG.powi(2)).sqrt()
 }
 
 /// The derivatives of the relation by the unknowns.
@@ -261,34 +303,37 @@ impl Fit {
         ]
     }
 
-    /// The fit to the stars that are not dimmed and have at most this expected error, their scatter, and their
+    /// The fit to the stars that are not dimmed and have at most this expected error, their errors, and their
     /// number. `None` if they are too few.
     fn of_clear_sky(
         candidates: &[Candidate],
         largest_mag: f64,
         is_flat: bool,
-    ) -> Option<(Self, f64, usize)> {
+    ) -> Option<(Self, StarErrors, usize)> {
         const ROUNDS: usize = 30;
-        /// Scatter of stars, in magnitudes, in the first round and at most.
-        const FIRST_SCATTER_MAG: f64 = 0.2;
-        const MOST_SCATTER_MAG: f64 = 0.5;
+        /// The errors of the first round.
+        const FIRST: StarErrors = StarErrors {
+            scale: 1.0,
+            scatter_mag: 0.2,
+        };
         let mut fit = Self::first(candidates, largest_mag, is_flat)?;
-        let (mut scatter_mag, mut used) = (FIRST_SCATTER_MAG, 0);
+        let (mut errors, mut used) = (FIRST, 0);
         for _ in 0..ROUNDS {
-            let kept = |star: &&Candidate| star.is_kept(&fit, scatter_mag, largest_mag);
+            let kept = |star: &&Candidate| star.is_kept(&fit, &errors, largest_mag);
             let kept: Vec<&Candidate> = candidates.iter().filter(kept).collect();
             if kept.len() < MIN_STARS {
                 return None;
             }
-            let next = Self::of(&kept, &fit, scatter_mag, is_flat)?;
-            let next_scatter_mag = scatter(&kept, &next).min(MOST_SCATTER_MAG);
-            let is_settled = kept.len() == used && (next_scatter_mag - scatter_mag).abs() < 1e-4;
-            (fit, scatter_mag, used) = (next, next_scatter_mag, kept.len());
+            let next = Self::of(&kept, &fit, &errors, is_flat)?;
+            let next_errors = errors_of(&kept, &next);
+            let changed_mag = (next_errors.scatter_mag - errors.scatter_mag).abs();
+            let is_settled = kept.len() == used && changed_mag < 1e-4;
+            (fit, errors, used) = (next, next_errors, kept.len());
             if is_settled {
                 break;
             }
         }
-        Some((fit, scatter_mag, used))
+        Some((fit, errors, used))
     }
 
     /// The relation of experience, as high as the brightest of the stars ask for.
@@ -307,7 +352,7 @@ impl Fit {
     }
 
     /// The fit to `stars`, with the errors that they have by the fit `before`.
-    fn of(stars: &[&Candidate], before: &Self, scatter_mag: f64, is_flat: bool) -> Option<Self> {
+    fn of(stars: &[&Candidate], before: &Self, errors: &StarErrors, is_flat: bool) -> Option<Self> {
         let known = Self::experience(is_flat);
         let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         let mut right = SVector::<f64, UNKNOWNS>::zeros();
@@ -316,7 +361,7 @@ impl Fit {
             right[unknown] += value * sigma.powi(-2);
         }
         for star in stars {
-            let variance = star.expected_sigma_mag(before).powi(2) + scatter_mag.powi(2);
+            let variance = errors.of(star.expected_sigma_mag(before)).powi(2);
             normal += star.row * star.row.transpose() / variance;
             right += star.row * (star.offset_mag / variance);
         }
@@ -333,7 +378,7 @@ impl Fit {
 
     fn clear_sky(
         &self,
-        scatter_mag: f64,
+        errors: StarErrors,
         stars: usize,
         has_horizon: bool,
         mean_vmag: f64,
@@ -357,9 +402,10 @@ impl Fit {
                 sigma: self.variance(&edge).sqrt(),
             },
             slope: estimate(SLOPE),
-            scatter_mag,
+            scatter_mag: errors.scatter_mag,
             stars,
             has_horizon,
+            errors,
             mean_vmag,
             unknowns: self.unknowns.into(),
             ground_sigma_mag: self

@@ -82,21 +82,17 @@ impl Sky<'_> {
     /// The logarithm of the likelihood of a star for each extinction.
     fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
         let star = witness.star;
-        let clear = self.clear_sky;
-        let measured = star.measured.map(|measured| {
-            let dimmer_mag = clear.dimmer_mag(star, measured.instrumental_mag);
-            (dimmer_mag, measured.sigma_mag.hypot(clear.scatter_mag))
-        });
+        let dimmed_by = self.clear_sky.dimmed_by(star);
         std::array::from_fn(|step| {
             let extinction_mag = step as f64 * STEP_MAG;
             let seen = limit.map_or(1.0, |limit| {
                 limit.probability(witness.relative_mag + extinction_mag)
             });
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
-            let likelihood = match (measured, star.is_detected) {
-                (Some((dimmer_mag, own_mag)), _) => {
-                    let sigma_mag = own_mag.hypot(CLOUD_VARIATION * extinction_mag);
-                    let off = (dimmer_mag - extinction_mag) / sigma_mag;
+            let likelihood = match (dimmed_by, star.is_detected) {
+                (Some(dimmed_by), _) => {
+                    let sigma_mag = dimmed_by.sigma.hypot(CLOUD_VARIATION * extinction_mag);
+                    let off = (dimmed_by.value - extinction_mag) / sigma_mag;
                     let agrees = libm::exp(-0.5 * off * off) / sigma_mag;
                     (1.0 - UNTRUE) * agrees + UNTRUE
                 }

@@ -18,11 +18,8 @@ impl RelativeLimit {
         /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
         const DIMMED_SIGMAS: f64 = 3.0;
         let is_dimmed = |witness: &&Witness| {
-            let star = witness.star;
-            star.measured.is_some_and(|measured| {
-                let dimmer_mag = clear_sky.dimmer_mag(star, measured.instrumental_mag);
-                dimmer_mag > DIMMED_SIGMAS * measured.sigma_mag.hypot(clear_sky.scatter_mag)
-            })
+            let dimmed_by = clear_sky.dimmed_by(witness.star);
+            dimmed_by.is_some_and(|dimmed_by| dimmed_by.value > DIMMED_SIGMAS * dimmed_by.sigma)
         };
         let cells = 1 + witnesses.iter().map(|witness| witness.cell).max()?;
         let mut dimmed = vec![[0usize; 2]; cells];
