@@ -77,6 +77,8 @@ pub mod frame;
 pub mod identify;
 pub mod lens;
 pub mod model;
+#[doc(hidden)]
+pub mod night;
 pub mod photometry;
 pub mod pipeline;
 pub mod report;

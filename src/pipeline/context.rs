@@ -1,5 +1,6 @@
 //! What the stages need and what does not change from frame to frame.
 
+use super::held::HeldCamera;
 use crate::base::epoch::ObservationDate;
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
@@ -30,6 +31,9 @@ pub struct Context<'a> {
     pub camera: Option<ObservingSetup>,
     /// The lens with which they were taken, where it was measured.
     pub lens: Option<Arc<KnownLens>>,
+    /// How the camera stands, where it does not move: tried first.
+    #[doc(hidden)]
+    pub held: Option<Arc<HeldCamera>>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
@@ -60,6 +64,7 @@ impl<'a> Context<'a> {
             priors: Priors::default(),
             camera: None,
             lens: None,
+            held: None,
             calibration: None,
             attitude_only: false,
             measure_sky: false,

@@ -34,6 +34,8 @@ pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
 pub use grid::Place;
 #[doc(hidden)]
+pub use grid::horizon_places;
+#[doc(hidden)]
 pub use picture::Picture;
 
 use super::IdentifiedFrame;
@@ -84,13 +86,15 @@ pub struct SkyCell {
     pub limit_vmag: Option<Estimate>,
 }
 
-/// Measures the sky over `frame`; `None` where too few stars tell the zero point.
+/// Measures the sky over `frame`; `None` where too few stars tell the zero point, and it is not known from
+/// another frame of the camera, whose clear sky is `usual`.
 #[doc(hidden)]
 pub fn measure(
     frame: &IdentifiedFrame,
     picture: &Picture,
     catalog: &IndexedCatalog,
     expected_limit_vmag: Option<f64>,
+    usual: Option<&ClearSky>,
 ) -> Option<SkyMap> {
     let view = SkyView {
         camera: &frame.identification.camera,
@@ -100,7 +104,7 @@ pub fn measure(
     let predicted = view.stars_to(catalog, super::depth_v_mag(frame, catalog));
     let association = associate(frame, &predicted);
     let stars = stars::of(frame, &association, &predicted, catalog);
-    let clear_sky = ClearSky::of(&stars, picture.is_flat)?;
+    let clear_sky = ClearSky::of(&stars, picture.is_flat).or(usual.copied())?;
     let grid = Grid::over(frame);
     let levels = Levels::of(frame, picture, &grid, &clear_sky);
     let depths = depth::depths(&levels, &clear_sky);
@@ -113,6 +117,7 @@ pub fn measure(
         detections: frame.detections,
         exposure_s: levels.exposure_s,
         chance: association.chance,
+        is_usual: usual.is_some_and(|usual| *usual == clear_sky),
     };
     let witnesses = sky.witnesses();
     let clouds = sky.clouds(&witnesses);
