@@ -21,6 +21,8 @@ pub struct Configuration {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask: Option<FileHash>,
     pub page: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub utc_offset_h: Option<f64>,
 }
 
 /// Which catalogue was used.

@@ -28,7 +28,7 @@ mod votable;
 mod write;
 
 pub use configuration::{CatalogIdentity, Configuration, FileHash};
-pub use directory::{Archive, PartWriter};
+pub use directory::{Archive, PartWriter, claim_file};
 pub use error::ArchiveError;
 pub use frame_row::FrameRow;
 pub use frames::{FrameSummary, frames};

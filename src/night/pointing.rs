@@ -1,5 +1,6 @@
 //! How the camera stands, and when it was moved.
 
+use super::row::NightRow;
 use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::statistics::median;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC};
@@ -90,6 +91,12 @@ impl PointingHistory {
             self.suspect(now, held);
         }
         shift_rad
+    }
+
+    /// As [`Self::take`] with the pointing of a row, where it has one.
+    pub fn take_row(&mut self, frame: usize, row: &NightRow) -> Option<f64> {
+        let sigma_rad = row.pointing_sigma_arcsec? * RAD_PER_ARCSEC;
+        Some(self.take(frame, row.horizon_to_camera()?, sigma_rad))
     }
 
     fn limit_rad(&self, sigma_rad: f64) -> f64 {

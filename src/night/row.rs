@@ -171,6 +171,20 @@ impl NightRow {
         Some(Rotation::from_quaternion(quaternion))
     }
 
+    /// Sets by how much the camera differs from how it is held.
+    pub fn set_shift(&mut self, shift_rad: f64) {
+        self.shift_arcmin = finite(shift_rad * ARCSEC_PER_RAD / 60.0, 2);
+    }
+
+    /// The same for a table, which has no cells.
+    #[must_use]
+    pub fn without_cells(&self) -> Self {
+        Self {
+            cells: None,
+            ..self.clone()
+        }
+    }
+
     fn set_date(&mut self, solution: &Solution) {
         let Some(date) = solution.date.map(|known| known.date) else {
             return;

@@ -6,6 +6,7 @@ use crate::identify::Identification;
 use crate::lens::{LensFrame, calibrate};
 use crate::photometry::sky_map::ClearSky;
 use crate::pipeline::{HeldCamera, Outcome, Solution};
+use crate::sky::observer::Site;
 use std::sync::Arc;
 
 /// Frames that tell the lens at least, where so many are identified.
@@ -23,6 +24,7 @@ pub struct Probe {
     pointing: Option<Rotation<Horizon, Camera>>,
     sigma_rad: f64,
     clear_sky: Option<ClearSky>,
+    site: Option<Site>,
 }
 
 impl Probe {
@@ -39,6 +41,7 @@ impl Probe {
             pointing: horizon_attitude(found),
             sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
+            site: solution.site,
         })
     }
 }
@@ -60,6 +63,8 @@ pub struct NightStart {
     pub held: Option<HeldCamera>,
     /// Zero point through one airmass in the clearest of the frames, in V.
     pub clear_ground_vmag: Option<f64>,
+    /// Where it is.
+    pub site: Option<Site>,
 }
 
 impl NightStart {
@@ -71,6 +76,7 @@ impl NightStart {
             .iter()
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
+        let site = probes.iter().find_map(|probe| probe.site);
         let lens = known.or_else(|| measured_lens(probes));
         let held = first.zip(lens.as_ref()).map(|((_, pointing, sigma_rad), lens)| HeldCamera {
             camera: *lens.camera(),
@@ -82,6 +88,7 @@ impl NightStart {
             lens,
             held,
             clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
+            site,
         }
     }
 

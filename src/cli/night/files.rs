@@ -1,0 +1,59 @@
+//! The files of a night.
+
+use crate::cli::output::files::NewFile;
+use crate::cli::output::rows::json_indented;
+use starpipe::archive::TableWriter;
+use starpipe::base::table::write_row;
+use starpipe::night::{NightRow, NightSummary, SkyglowStation, skyglow};
+use std::path::Path;
+
+/// Names of the files, beside that of the run.
+pub(super) const NAMES: [&str; 6] = [
+    ROWS,
+    "night.csv",
+    "night.parquet",
+    "night.dat",
+    "night.json",
+    "lens.toml",
+];
+/// The rows.
+pub(super) const ROWS: &str = "night.jsonl";
+/// Says whose the directory is.
+pub(super) const RUN: &str = "night-run.json";
+
+/// The files that are made of all rows.
+pub(super) fn of_rows(
+    directory: &Path,
+    rows: &[NightRow],
+    night: &NightSummary,
+    station: &SkyglowStation,
+    lens: Option<String>,
+) -> anyhow::Result<Vec<NewFile>> {
+    let file = |name: &str, content: Vec<u8>| (directory.join(name), content);
+    let mut files = vec![
+        file("night.csv", csv(rows)?),
+        file("night.parquet", parquet(rows)?),
+        file("night.dat", skyglow(rows, station).into_bytes()),
+        file("night.json", json_indented(night)?.into_bytes()),
+    ];
+    files.extend(lens.map(|lens| file("lens.toml", lens.into_bytes())));
+    Ok(files)
+}
+
+fn csv(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {
+    let columns = NightRow::columns();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(columns.iter().map(|column| column.name))?;
+    for row in rows {
+        write_row(&mut writer, &columns, row)?;
+    }
+    Ok(writer.into_inner().map_err(csv::IntoInnerError::into_error)?)
+}
+
+fn parquet(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {
+    let mut writer = TableWriter::new(Vec::new(), "night", NightRow::columns())?;
+    for row in rows {
+        writer.add(row.without_cells())?;
+    }
+    Ok(writer.finish()?)
+}
