@@ -27,7 +27,7 @@ mod status;
 mod votable;
 mod write;
 
-pub use configuration::{CatalogIdentity, Configuration, FileHash};
+pub use configuration::{CatalogIdentity, Configuration, FileHash, NightConfiguration};
 pub use directory::{Archive, PartWriter, claim_file};
 pub use error::ArchiveError;
 pub use frame_row::FrameRow;

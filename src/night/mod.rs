@@ -8,7 +8,8 @@
 //!    identified: by the attitude that the mount and the date give ([`NightRow`]).
 //! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
 //!    frames that agree with each other ([`PointingHistory`]).
-//! 4. The series tell when something changes ([`Moment`]).
+//! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels`]).
+//! 5. The series tell when something changes ([`Moment`]).
 //!
 //! Caveats: a camera that follows the stars has no pointing in the horizon to hold; its frames are solved
 //! one by one.
@@ -16,6 +17,8 @@
 mod almanac;
 mod cells;
 mod departure;
+mod figure;
+mod hot_pixels;
 mod moments;
 mod pointing;
 mod row;
@@ -25,6 +28,8 @@ mod summary;
 
 pub use almanac::Almanac;
 pub use cells::NightCells;
+pub use figure::svg;
+pub use hot_pixels::{NightHotPixel, Standouts, hot_pixels};
 pub use moments::{Moment, MomentKind};
 pub use pointing::{Knock, PointingHistory};
 pub use row::NightRow;

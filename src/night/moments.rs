@@ -82,6 +82,29 @@ pub struct Moment {
     pub angle_deg: Option<f64>,
 }
 
+impl Moment {
+    /// In words.
+    pub fn to_text(&self) -> String {
+        let mut text = self.kind.text().to_owned();
+        if let Some(azimuth_deg) = self.azimuth_deg {
+            text += &format!(", {} ({azimuth_deg:.0}°)", compass(azimuth_deg));
+        }
+        if let Some(angle_deg) = self.angle_deg {
+            text += &format!(" ({angle_deg}°)");
+        }
+        text
+    }
+}
+
+/// The nearest of 16 compass points.
+fn compass(azimuth_deg: f64) -> &'static str {
+    const POINTS: [&str; 16] = [
+        "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW",
+        "NNW",
+    ];
+    POINTS[(azimuth_deg / 22.5).round() as usize % POINTS.len()]
+}
+
 /// Rows of a night and their dates.
 pub(super) struct Series<'a> {
     rows: &'a [NightRow],
@@ -242,5 +265,15 @@ impl<'a> Series<'a> {
             }
         }
         moments
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compass_points_are_the_nearest() {
+        assert_eq!([0.0, 11.0, 12.0, 180.0, 281.0, 355.0].map(compass), ["N", "N", "NNE", "S", "W", "N"]);
     }
 }

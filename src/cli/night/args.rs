@@ -1,5 +1,6 @@
 //! The arguments of `night`.
 
+use super::files;
 use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
@@ -10,6 +11,7 @@ use crate::cli::process::CalibrationOptions;
 use crate::cli::solving::Plan;
 use clap::Args;
 use jiff::SignedDuration;
+use starpipe::calibration::Calibration;
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
 
@@ -20,7 +22,7 @@ use std::path::PathBuf;
     The frames are taken in the order of their dates. Some that are spread over the night tell the lens and how\n\
     the camera stands; both are then held. --out has a line for each frame in night.jsonl, the same as\n\
     night.csv, night.parquet and night.dat (the zenith in the skyglow community's format), and the night in\n\
-    night.json and night.svg. The same command goes on where it was stopped.\n\n\
+    night.json and night.svg; hot-pixels.csv lists what stays as the sky moves. The same command goes on where it was stopped.\n\n\
     Exit status: 0 all went well, 1 something could not be read or written, 2 the command line is wrong, 3 no\n\
     frame was identified.")]
 pub(crate) struct NightArgs {
@@ -41,6 +43,9 @@ pub(crate) struct NightArgs {
     /// Print errors only
     #[arg(short, long, conflicts_with = "format")]
     pub(super) quiet: bool,
+    /// Leave out the hot pixels that the sky's motion tells, which hot-pixels.csv lists
+    #[arg(long, conflicts_with = "hot_pixels")]
+    pub(super) mask_hot_pixels: bool,
     #[command(flatten)]
     pub(super) calibration: CalibrationOptions,
     /// Exposure of the frames, in seconds [default: the exposure in the file's header]
@@ -82,6 +87,15 @@ impl NightArgs {
         const S_PER_HOUR: f64 = 3600.0;
         self.utc_offset
             .map(|hours| SignedDuration::from_secs((hours * S_PER_HOUR).round() as i64))
+    }
+
+    /// The calibration with the hot pixels that were learned.
+    pub(super) fn masked_calibration(&self) -> anyhow::Result<Option<Calibration>> {
+        let learned = CalibrationOptions {
+            hot_pixels: Some(self.out.join(files::HOT_PIXELS)),
+            ..self.calibration.clone()
+        };
+        learned.read(self.hints.description()?.as_ref())
     }
 
     /// What the frames are solved with.

@@ -4,20 +4,24 @@ use crate::cli::output::files::NewFile;
 use crate::cli::output::rows::json_indented;
 use starpipe::archive::TableWriter;
 use starpipe::base::table::write_row;
-use starpipe::night::{NightRow, NightSummary, SkyglowStation, skyglow};
+use starpipe::night::{self, NightRow, NightSummary, SkyglowStation, skyglow};
 use std::path::Path;
 
 /// Names of the files, beside that of the run.
-pub(super) const NAMES: [&str; 6] = [
+pub(super) const NAMES: [&str; 8] = [
     ROWS,
     "night.csv",
     "night.parquet",
     "night.dat",
     "night.json",
+    "night.svg",
     "lens.toml",
+    HOT_PIXELS,
 ];
 /// The rows.
 pub(super) const ROWS: &str = "night.jsonl";
+/// The hot pixels.
+pub(super) const HOT_PIXELS: &str = "hot-pixels.csv";
 /// Says whose the directory is.
 pub(super) const RUN: &str = "night-run.json";
 
@@ -25,7 +29,7 @@ pub(super) const RUN: &str = "night-run.json";
 pub(super) fn of_rows(
     directory: &Path,
     rows: &[NightRow],
-    night: &NightSummary,
+    summary: &NightSummary,
     station: &SkyglowStation,
     lens: Option<String>,
 ) -> anyhow::Result<Vec<NewFile>> {
@@ -34,8 +38,10 @@ pub(super) fn of_rows(
         file("night.csv", csv(rows)?),
         file("night.parquet", parquet(rows)?),
         file("night.dat", skyglow(rows, station).into_bytes()),
-        file("night.json", json_indented(night)?.into_bytes()),
+        file("night.json", json_indented(summary)?.into_bytes()),
     ];
+    let figure = night::svg(rows, summary);
+    files.extend(figure.map(|figure| file("night.svg", figure.into_bytes())));
     files.extend(lens.map(|lens| file("lens.toml", lens.into_bytes())));
     Ok(files)
 }

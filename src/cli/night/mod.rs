@@ -2,6 +2,7 @@
 
 mod args;
 mod files;
+mod hot;
 mod journal;
 mod order;
 mod run;
@@ -18,7 +19,7 @@ use super::process::hash_of;
 use super::solving::Plan;
 use journal::Journal;
 use run::{BATCH, Measured, Run};
-use starpipe::archive::{self, ArchiveError, Configuration, Identity};
+use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::lens::MEASURED_BY;
 use starpipe::night::{SkyglowStation, summarize};
 use starpipe::sky::catalog::Catalog;
@@ -41,8 +42,19 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
             context,
             is_quiet: arguments.quiet,
         };
-        let measured = run.measure(&names, journal, rows)?;
-        finish(arguments, &measured)
+        let start = run.start(&names);
+        let hot = hot::learn(&run, &names, &start);
+        if let Some(pixels) = &hot {
+            let list = (arguments.out.join(files::HOT_PIXELS), hot::table(pixels)?.into_bytes());
+            write_whole(&[list])?;
+        }
+        let masked = match &hot {
+            Some(pixels) if arguments.mask_hot_pixels && !pixels.is_empty() => arguments.masked_calibration()?,
+            _ => None,
+        };
+        let run = run.with_calibration(masked.as_ref());
+        let measured = run.measure(&names, start, journal, rows)?;
+        finish(arguments, &measured, hot.map(|pixels| pixels.len()))
     })
 }
 
@@ -89,18 +101,26 @@ fn configuration(
         hot_pixels: hash_of(&calibration.hot_pixels)?,
         mask: hash_of(&calibration.mask)?,
         page: None,
-        utc_offset_h: arguments.utc_offset,
+        night: Some(NightConfiguration {
+            utc_offset_h: arguments.utc_offset,
+            mask_hot_pixels: arguments.mask_hot_pixels,
+        }),
     })
 }
 
 /// Writes the files of a night, and says what it was.
-fn finish(arguments: &NightArgs, measured: &Measured) -> Result<Outcome, CommandError> {
+fn finish(
+    arguments: &NightArgs,
+    measured: &Measured,
+    hot_pixels: Option<usize>,
+) -> Result<Outcome, CommandError> {
     let Measured {
         rows,
         history,
         start,
     } = measured;
-    let night = summarize(rows, start.site, history.knocks());
+    let mut night = summarize(rows, start.site, history.knocks());
+    night.hot_pixels = hot_pixels;
     let station = SkyglowStation {
         instrument: arguments.station.instrument.clone(),
         supplier: arguments.station.supplier.clone(),

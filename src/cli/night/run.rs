@@ -6,6 +6,7 @@ use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{Inputs, Plan, Sink, Solved, Solver};
 use indicatif::ProgressBar;
+use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::night::{NightRow, NightStart, PointingHistory, Probe, probe_order};
 use starpipe::pipeline::{Context, HeldCamera};
@@ -30,16 +31,23 @@ pub(super) struct Measured {
     pub(super) start: NightStart,
 }
 
-impl Run<'_> {
+impl<'a> Run<'a> {
+    /// The same with another calibration, if there is one.
+    pub(super) fn with_calibration(self, calibration: Option<&'a Calibration>) -> Self {
+        let mut context = self.context;
+        context.calibration = calibration.or(context.calibration);
+        Self { context, ..self }
+    }
+
     /// Measures the frames `names`, in their order, going on after the rows in `journal`.
     pub(super) fn measure(
         &self,
         names: &[String],
+        start: NightStart,
         mut journal: Journal,
         rows: Vec<NightRow>,
     ) -> Result<Measured, CommandError> {
         let progress = self.bar(names.len());
-        let start = self.start(names);
         let mut measured = Measured {
             history: PointingHistory::new(start.held.as_ref().map(|held| held.pointing)),
             rows: Vec::with_capacity(names.len()),
@@ -70,7 +78,7 @@ impl Run<'_> {
     }
 
     /// What frames all over the night tell.
-    fn start(&self, names: &[String]) -> NightStart {
+    pub(super) fn start(&self, names: &[String]) -> NightStart {
         let order = probe_order(names.len());
         let mut probes = Vec::new();
         let mut tried = 0;

@@ -42,15 +42,11 @@ pub(super) fn text(night: &NightSummary) -> String {
     if !values.is_empty() {
         let _ = writeln!(text, "medians    {}", values.join(", "));
     }
+    if let Some(pixels) = night.hot_pixels.filter(|pixels| *pixels > 0) {
+        let _ = writeln!(text, "hot        {}, listed in hot-pixels.csv", counted(pixels, "pixel"));
+    }
     for moment in &night.moments {
-        let _ = write!(text, "{:<10} {}", time_of(&moment.date), moment.kind.text());
-        if let Some(azimuth_deg) = moment.azimuth_deg {
-            let _ = write!(text, ", {} ({azimuth_deg:.0}°)", compass(azimuth_deg));
-        }
-        if let Some(angle_deg) = moment.angle_deg {
-            let _ = write!(text, " ({angle_deg}°)");
-        }
-        text.push('\n');
+        let _ = writeln!(text, "{:<10} {}", time_of(&moment.date), moment.to_text());
     }
     text
 }
@@ -63,23 +59,4 @@ fn or_dash(text: &str) -> &str {
 fn time_of(date: &str) -> String {
     let time = date.split_once('T').map_or(date, |(_, time)| time);
     time.chars().take(8).collect::<String>().trim_end_matches('Z').to_owned()
-}
-
-/// The nearest of 16 compass points.
-fn compass(azimuth_deg: f64) -> &'static str {
-    const POINTS: [&str; 16] = [
-        "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW",
-        "NNW",
-    ];
-    POINTS[(azimuth_deg / 22.5).round() as usize % POINTS.len()]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn compass_points_are_the_nearest() {
-        assert_eq!([0.0, 11.0, 12.0, 180.0, 281.0, 355.0].map(compass), ["N", "N", "NNE", "S", "W", "N"]);
-    }
 }

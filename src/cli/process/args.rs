@@ -56,7 +56,7 @@ pub(crate) struct ProcessArgs {
     pub(super) parts: PartOptions,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Calibration")]
 pub(crate) struct CalibrationOptions {
     /// Dark frame or master dark to subtract; see `starpipe darks`

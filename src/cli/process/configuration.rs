@@ -29,7 +29,7 @@ pub(super) fn configuration(
         hot_pixels: hash_of(hot_pixels)?,
         mask: hash_of(mask)?,
         page: arguments.page.and_then(text_of),
-        utc_offset_h: None,
+        night: None,
     })
 }
 
