@@ -54,6 +54,7 @@
 //! | [`lens`] | which lens, from several frames of a camera at once |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
+//! | `night` | what does a night of one camera show: its series, and what changes when |
 //! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
 //! | `study` | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!

@@ -10,7 +10,16 @@ const SHOWN: [(&str, [&[&str]; 2]); 12] = [
     (
         "night",
         [
-            &["out", "dark", "flat", "mask", "utc_offset", "quiet", "fov"],
+            &[
+                "out",
+                "html",
+                "dark",
+                "flat",
+                "mask",
+                "utc_offset",
+                "quiet",
+                "fov",
+            ],
             &["site", "camera", "format", "threads", "catalog"],
         ],
     ),

@@ -29,7 +29,9 @@ pub(super) struct Departure {
 /// Where `values` depart by `least_step` or more. Values that are not known are passed over.
 pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departure> {
     let known = values.iter().enumerate();
-    let known: Vec<(usize, f64)> = known.filter_map(|(at, value)| Some((at, (*value)?))).collect();
+    let known: Vec<(usize, f64)> = known
+        .filter_map(|(at, value)| Some((at, (*value)?)))
+        .collect();
     let Some(limit) = limit(&known, least_step) else {
         return Vec::new();
     };

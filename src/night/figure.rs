@@ -83,7 +83,10 @@ const PLOTS: [Plot; 5] = [
             Layer {
                 name: "extinction per airmass",
                 color: BLUE,
-                value: |row| row.extinction_mag_per_airmass.filter(|_| row.extinction_measured),
+                value: |row| {
+                    row.extinction_mag_per_airmass
+                        .filter(|_| row.extinction_measured)
+                },
             },
             Layer {
                 name: "stars dimmer than at their best",
@@ -173,16 +176,25 @@ fn title(night: &NightSummary) -> String {
     } else {
         format!("{first} to {last}")
     }];
-    parts.push(format!("{:.1} of {:.1} hours clear", night.clear_hours, night.hours));
+    parts.push(format!(
+        "{:.1} of {:.1} hours clear",
+        night.clear_hours, night.hours
+    ));
     if let Some(hour) = &night.darkest_hour {
-        parts.push(format!("darkest hour V {:.2} mag/arcsec²", hour.zenith_mag_arcsec2));
+        parts.push(format!(
+            "darkest hour V {:.2} mag/arcsec²",
+            hour.zenith_mag_arcsec2
+        ));
     }
     parts.join(" · ")
 }
 
 /// Shades twilight and the Moon behind a plot: each frame stands for half of the way to its neighbors.
 fn shade(out: &mut String, rows: &[NightRow], time: &TimeAxis, top: f64) {
-    let dated: Vec<(f64, &NightRow)> = rows.iter().filter_map(|row| Some((row.mjd?, row))).collect();
+    let dated: Vec<(f64, &NightRow)> = rows
+        .iter()
+        .filter_map(|row| Some((row.mjd?, row)))
+        .collect();
     for (at, (mjd, row)) in dated.iter().enumerate() {
         let before = at.checked_sub(1).map_or(*mjd, |at| dated[at].0);
         let after = dated.get(at + 1).map_or(*mjd, |next| next.0);
@@ -194,8 +206,13 @@ fn shade(out: &mut String, rows: &[NightRow], time: &TimeAxis, top: f64) {
             "astronomical" => 0.1,
             _ => 0.0,
         };
-        let is_moon_up = row.moon_altitude_deg.is_some_and(|altitude_deg| altitude_deg > 0.0);
-        let moon = row.moon_illuminated.filter(|_| is_moon_up).map_or(0.0, |share| 0.08 + 0.3 * share);
+        let is_moon_up = row
+            .moon_altitude_deg
+            .is_some_and(|altitude_deg| altitude_deg > 0.0);
+        let moon = row
+            .moon_illuminated
+            .filter(|_| is_moon_up)
+            .map_or(0.0, |share| 0.08 + 0.3 * share);
         for (shade, color) in [(twilight, "#f0a030"), (moon, "#9a9ac8")] {
             if shade > 0.0 {
                 let _ = writeln!(
@@ -222,7 +239,10 @@ impl Plot {
         if let Some(bounds) = self.bounds {
             return bounds;
         }
-        let values = self.layers.iter().flat_map(|layer| rows.iter().filter_map(layer.value));
+        let values = self
+            .layers
+            .iter()
+            .flat_map(|layer| rows.iter().filter_map(layer.value));
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
             [low.min(value), high.max(value)]
         });
@@ -234,7 +254,11 @@ impl Plot {
         const TICKS: usize = 4;
         let [low, high] = self.range(rows);
         let y = |value: f64| top + PLOT * (high - value) / (high - low);
-        let decimals = if high - low > 20.0 { 0 } else { usize::from(high - low < 1.0) + 1 };
+        let decimals = if high - low > 20.0 {
+            0
+        } else {
+            usize::from(high - low < 1.0) + 1
+        };
         for tick in 0..=TICKS {
             let value = low + (high - low) * tick as f64 / TICKS as f64;
             let _ = writeln!(
@@ -302,7 +326,9 @@ fn keogram_cells() -> Vec<(usize, f64)> {
         nearest.map_or(0, |(cell, _)| cell)
     };
     let rings = (0..18).map(|ring| 5.0 * f64::from(ring) + HALF_DEG);
-    let south = rings.clone().map(|altitude| (nearest(altitude, 180.0), altitude));
+    let south = rings
+        .clone()
+        .map(|altitude| (nearest(altitude, 180.0), altitude));
     let north = rings.map(|altitude| (nearest(altitude, 0.0), 180.0 - altitude));
     south.chain(north).collect()
 }
@@ -325,7 +351,10 @@ fn draw_keogram(
     values.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| values[(share * (values.len() - 1) as f64) as usize];
     let (bright, dark) = (at(0.01), at(0.99));
-    let dated: Vec<(f64, &NightRow)> = rows.iter().filter_map(|row| Some((row.mjd?, row))).collect();
+    let dated: Vec<(f64, &NightRow)> = rows
+        .iter()
+        .filter_map(|row| Some((row.mjd?, row)))
+        .collect();
     let step = PLOT / cells.len() as f64;
     for (number, (mjd, row)) in dated.iter().enumerate() {
         let before = number.checked_sub(1).map_or(*mjd, |at| dated[at].0);

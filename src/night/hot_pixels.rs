@@ -110,13 +110,19 @@ pub fn hot_pixels(
     site: Option<Site>,
 ) -> Option<Vec<NightHotPixel>> {
     let first = frames.first()?;
-    let frames: Vec<&Standouts> = frames.iter().filter(|frame| frame.size == first.size).collect();
+    let frames: Vec<&Standouts> = frames
+        .iter()
+        .filter(|frame| frame.size == first.size)
+        .collect();
     if frames.len() < MIN_FRAMES {
         return None;
     }
     let mut counted: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for (index, excess_adu) in frames.iter().flat_map(|frame| &frame.pixels) {
-        counted.entry(*index).or_default().push(f64::from(*excess_adu));
+        counted
+            .entry(*index)
+            .or_default()
+            .push(f64::from(*excess_adu));
     }
     let motion = Motion::of(&frames, held, site);
     let [width, height] = first.size;
@@ -148,7 +154,8 @@ struct Motion<'a> {
 impl<'a> Motion<'a> {
     fn of(frames: &[&Standouts], held: Option<&'a HeldCamera>, site: Option<Site>) -> Option<Self> {
         let dates = || frames.iter().filter_map(|frame| frame.mjd);
-        let days = dates().fold(f64::NEG_INFINITY, f64::max) - dates().fold(f64::INFINITY, f64::min);
+        let days =
+            dates().fold(f64::NEG_INFINITY, f64::max) - dates().fold(f64::INFINITY, f64::min);
         let (sin, cos) = libm::sincos(site?.lat_deg() * RAD_PER_DEG);
         let pole = Unit::new_normalize(Vector3::new(0.0, cos, sin));
         // The sky turns to the west.

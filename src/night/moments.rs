@@ -99,8 +99,8 @@ impl Moment {
 /// The nearest of 16 compass points.
 fn compass(azimuth_deg: f64) -> &'static str {
     const POINTS: [&str; 16] = [
-        "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW",
-        "NNW",
+        "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW",
+        "NW", "NNW",
     ];
     POINTS[(azimuth_deg / 22.5).round() as usize % POINTS.len()]
 }
@@ -274,6 +274,9 @@ mod tests {
 
     #[test]
     fn compass_points_are_the_nearest() {
-        assert_eq!([0.0, 11.0, 12.0, 180.0, 281.0, 355.0].map(compass), ["N", "N", "NNE", "S", "W", "N"]);
+        assert_eq!(
+            [0.0, 11.0, 12.0, 180.0, 281.0, 355.0].map(compass),
+            ["N", "N", "NNE", "S", "W", "N"]
+        );
     }
 }

@@ -164,8 +164,11 @@ mod tests {
 
     /// A pointing that is turned by this about the boresight, in degrees.
     fn turned(deg: f64) -> Rotation<Horizon, Camera> {
-        Rotation::from_quaternion([1.0, 0.0, 0.0, 0.0])
-            .then_turn(Vector3::new(0.0, 0.0, deg * RAD_PER_DEG))
+        Rotation::from_quaternion([1.0, 0.0, 0.0, 0.0]).then_turn(Vector3::new(
+            0.0,
+            0.0,
+            deg * RAD_PER_DEG,
+        ))
     }
 
     fn after(degrees: &[f64]) -> PointingHistory {
@@ -190,7 +193,11 @@ mod tests {
 
     #[test]
     fn a_single_frame_elsewhere_and_a_camera_that_turns_are_no_knocks() {
-        assert!(after(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0]).knocks().is_empty());
+        assert!(
+            after(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0])
+                .knocks()
+                .is_empty()
+        );
         let turning: Vec<f64> = (0..30).map(f64::from).collect();
         assert!(after(&turning).knocks().is_empty());
     }

@@ -251,7 +251,8 @@ impl NightRow {
         }
         self.cells = NightCells::of(sky);
         let share = sky.cloud_share.as_ref();
-        let of_share = |value: fn(&Estimate) -> f64| share.and_then(|share| finite(value(share), 4));
+        let of_share =
+            |value: fn(&Estimate) -> f64| share.and_then(|share| finite(value(share), 4));
         self.cloud_share = of_share(|share| share.value);
         self.cloud_share_sigma = of_share(|share| share.sigma);
         // Else the clear sky may be that of another frame.
@@ -265,11 +266,14 @@ impl NightRow {
             self.extinction_sigma_mag = mag(clear.extinction_mag.sigma);
             self.extinction_measured = clear.is_extinction_measured;
         }
-        self.dimming_mag = clear_ground_vmag.and_then(|clearest| mag(clearest - clear.ground_vmag()));
+        self.dimming_mag =
+            clear_ground_vmag.and_then(|clearest| mag(clearest - clear.ground_vmag()));
         let mut limits: Vec<[f64; 2]> = sky.cells.iter().filter_map(clear_limit).collect();
         let mut median_of = |part: usize| {
             let mut values: Vec<f64> = limits.iter_mut().map(|limit| limit[part]).collect();
-            (!values.is_empty()).then(|| median(&mut values)).and_then(mag)
+            (!values.is_empty())
+                .then(|| median(&mut values))
+                .and_then(mag)
         };
         self.clear_limit_vmag = median_of(0);
         self.clear_limit_difference_mag = median_of(1);
@@ -290,7 +294,8 @@ fn clear_limit(cell: &crate::photometry::sky_map::SkyCell) -> Option<[f64; 2]> {
     use crate::photometry::sky_map::Place;
     const CLEAR: f64 = 0.9;
     const LOW_DEG: f64 = 30.0;
-    let is_low = matches!(cell.place, Place::Horizon { altitude_deg, .. } if altitude_deg[0] < LOW_DEG);
+    let is_low =
+        matches!(cell.place, Place::Horizon { altitude_deg, .. } if altitude_deg[0] < LOW_DEG);
     if is_low || cell.clear? < CLEAR {
         return None;
     }

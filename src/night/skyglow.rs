@@ -135,9 +135,16 @@ mod tests {
         let text = skyglow(&rows, &station);
         assert!(text.is_ascii() && !text.replace("\r\n", "").contains(['\n', '\r', '\t']));
         let lines: Vec<&str> = text.split_terminator("\r\n").collect();
-        assert!(lines[..35].iter().all(|line| line.starts_with("# ") && line.len() <= 150));
+        assert!(
+            lines[..35]
+                .iter()
+                .all(|line| line.starts_with("# ") && line.len() <= 150)
+        );
         assert_eq!(lines[2], "# Number of header lines: 35");
-        assert_eq!(lines[8], "# Position (lat, lon, elev(m)): 69.650000, 18.960000, 100");
+        assert_eq!(
+            lines[8],
+            "# Position (lat, lon, elev(m)): 69.650000, 18.960000, 100"
+        );
         assert_eq!(
             lines[35..],
             [

@@ -78,12 +78,14 @@ impl NightStart {
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let site = probes.iter().find_map(|probe| probe.site);
         let lens = known.or_else(|| measured_lens(probes));
-        let held = first.zip(lens.as_ref()).map(|((_, pointing, sigma_rad), lens)| HeldCamera {
-            camera: *lens.camera(),
-            pointing,
-            sigma_rad,
-            clear_sky,
-        });
+        let held = first
+            .zip(lens.as_ref())
+            .map(|((_, pointing, sigma_rad), lens)| HeldCamera {
+                camera: *lens.camera(),
+                pointing,
+                sigma_rad,
+                clear_sky,
+            });
         Self {
             lens,
             held,

@@ -77,7 +77,10 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
     let count = |is: fn(&NightRow) -> bool| rows.iter().filter(|row| is(row)).count();
     let hours = |is: fn(&NightRow) -> bool| finite(hours_of(rows, is), 3).unwrap_or(0.0);
     let is_dark = |row: &NightRow| row.twilight == "night";
-    let mut dates = rows.iter().map(|row| &row.date).filter(|date| !date.is_empty());
+    let mut dates = rows
+        .iter()
+        .map(|row| &row.date)
+        .filter(|date| !date.is_empty());
     let first_date = dates.next().cloned().unwrap_or_default();
     NightSummary {
         schema: 1,
@@ -98,7 +101,8 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
             limit_vmag: median_of(rows, |row| row.limit_vmag),
             limit_difference_mag: median_of(rows, |row| row.limit_difference_mag),
             extinction_mag_per_airmass: median_of(rows, |row| {
-                row.extinction_mag_per_airmass.filter(|_| row.extinction_measured)
+                row.extinction_mag_per_airmass
+                    .filter(|_| row.extinction_measured)
             }),
             cloud_share: median_of(rows, |row| row.cloud_share),
             spot_sigma_px: median_of(rows, |row| row.spot_sigma_px),
@@ -117,12 +121,17 @@ fn is_clear(row: &NightRow) -> bool {
 
 fn median_of(rows: &[NightRow], value: fn(&NightRow) -> Option<f64>) -> Option<f64> {
     let mut values: Vec<f64> = rows.iter().filter_map(value).collect();
-    (!values.is_empty()).then(|| median(&mut values)).and_then(|value| finite(value, 4))
+    (!values.is_empty())
+        .then(|| median(&mut values))
+        .and_then(|value| finite(value, 4))
 }
 
 /// Hours for which frames stand that are like this: each half of the way to its neighbors.
 fn hours_of(rows: &[NightRow], is: fn(&NightRow) -> bool) -> f64 {
-    let dated: Vec<(f64, bool)> = rows.iter().filter_map(|row| Some((row.mjd?, is(row)))).collect();
+    let dated: Vec<(f64, bool)> = rows
+        .iter()
+        .filter_map(|row| Some((row.mjd?, is(row))))
+        .collect();
     let half = |pair: &[(f64, bool)]| {
         let gap_d = (pair[1].0 - pair[0].0).clamp(0.0, MAX_GAP_D);
         0.5 * gap_d * f64::from(u8::from(pair[0].1) + u8::from(pair[1].1))
@@ -134,7 +143,9 @@ fn hours_of(rows: &[NightRow], is: fn(&NightRow) -> bool) -> f64 {
 fn darkest_hour(rows: &[NightRow]) -> Option<DarkestHour> {
     const HOUR_D: f64 = 1.0 / 24.0;
     const MIN_FRAMES: usize = 3;
-    let known = rows.iter().filter_map(|row| Some((row.mjd?, row.zenith_mag_arcsec2?, row)));
+    let known = rows
+        .iter()
+        .filter_map(|row| Some((row.mjd?, row.zenith_mag_arcsec2?, row)));
     let known: Vec<(f64, f64, &NightRow)> = known.collect();
     let hour = |start: usize| {
         let frames = known[start..]
@@ -144,7 +155,9 @@ fn darkest_hour(rows: &[NightRow]) -> Option<DarkestHour> {
         let last = start + values.len() - 1;
         (values.len() >= MIN_FRAMES).then(|| (median(&mut values), start, last))
     };
-    let darkest = (0..known.len()).filter_map(hour).max_by(|a, b| a.0.total_cmp(&b.0));
+    let darkest = (0..known.len())
+        .filter_map(hour)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
     let (mag, first, last) = darkest?;
     Some(DarkestHour {
         from: known[first].2.date.clone(),

@@ -323,7 +323,9 @@ impl StarSearch<'_, '_> {
                     break;
                 }
             }
-            outcome.unwrap_or(Outcome::NotIdentified(Reason::Search(SearchFailure::Interrupted)))
+            outcome.unwrap_or(Outcome::NotIdentified(Reason::Search(
+                SearchFailure::Interrupted,
+            )))
         });
         Ok(Some(FoundStars {
             detections,

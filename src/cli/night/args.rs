@@ -33,6 +33,9 @@ pub(crate) struct NightArgs {
     /// Directory for the results
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: PathBuf,
+    /// Also write night.html: the figure, what changed, and the table, to look at in a browser
+    #[arg(long)]
+    pub(super) html: bool,
     /// How many hours the dates in the files' names are ahead of UTC: 0 if they are UTC. Dates in headers
     /// are UTC [default: not known, and such dates tell no place in the sky of a site]
     #[arg(long, value_name = "HOURS", value_parser = values::finite, allow_hyphen_values = true)]

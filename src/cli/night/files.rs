@@ -8,18 +8,23 @@ use starpipe::night::{self, NightRow, NightSummary, SkyglowStation, skyglow};
 use std::path::Path;
 
 /// Names of the files, beside that of the run.
-pub(super) const NAMES: [&str; 8] = [
+pub(super) const NAMES: [&str; 9] = [
     ROWS,
     "night.csv",
     "night.parquet",
     "night.dat",
     "night.json",
     "night.svg",
-    "lens.toml",
+    LENS,
+    PAGE,
     HOT_PIXELS,
 ];
 /// The rows.
 pub(super) const ROWS: &str = "night.jsonl";
+/// The lens that was held.
+pub(super) const LENS: &str = "lens.toml";
+/// The page.
+pub(super) const PAGE: &str = "night.html";
 /// The hot pixels.
 pub(super) const HOT_PIXELS: &str = "hot-pixels.csv";
 /// Says whose the directory is.
@@ -31,29 +36,31 @@ pub(super) fn of_rows(
     rows: &[NightRow],
     summary: &NightSummary,
     station: &SkyglowStation,
-    lens: Option<String>,
 ) -> anyhow::Result<Vec<NewFile>> {
     let file = |name: &str, content: Vec<u8>| (directory.join(name), content);
     let mut files = vec![
-        file("night.csv", csv(rows)?),
+        file("night.csv", csv(rows)?.into_bytes()),
         file("night.parquet", parquet(rows)?),
         file("night.dat", skyglow(rows, station).into_bytes()),
         file("night.json", json_indented(summary)?.into_bytes()),
     ];
     let figure = night::svg(rows, summary);
     files.extend(figure.map(|figure| file("night.svg", figure.into_bytes())));
-    files.extend(lens.map(|lens| file("lens.toml", lens.into_bytes())));
     Ok(files)
 }
 
-fn csv(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {
+/// The rows as CSV.
+pub(super) fn csv(rows: &[NightRow]) -> anyhow::Result<String> {
     let columns = NightRow::columns();
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(columns.iter().map(|column| column.name))?;
     for row in rows {
         write_row(&mut writer, &columns, row)?;
     }
-    Ok(writer.into_inner().map_err(csv::IntoInnerError::into_error)?)
+    let bytes = writer
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
+    Ok(String::from_utf8(bytes)?)
 }
 
 fn parquet(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {

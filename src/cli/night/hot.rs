@@ -21,14 +21,23 @@ pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<V
         buffers.set_memory(run.plan.memory);
         // Frames that cannot be read are reported with their rows.
         let frame = read_frame(Path::new(name), None, &mut buffers).ok()?;
-        let mjd = frame.metadata.date.and_then(|date| date.modified_julian_date());
+        let mjd = frame
+            .metadata
+            .date
+            .and_then(|date| date.modified_julian_date());
         Some(Standouts::of(&frame.into_stored(), mjd))
     };
     let mut found = Vec::new();
-    for_each_ordered(run.pool, &chosen, || (), read, |_, standouts| {
-        found.extend(standouts);
-        ControlFlow::Continue(())
-    });
+    for_each_ordered(
+        run.pool,
+        &chosen,
+        || (),
+        read,
+        |_, standouts| {
+            found.extend(standouts);
+            ControlFlow::Continue(())
+        },
+    );
     hot_pixels(&found, start.held.as_ref(), start.site)
 }
 

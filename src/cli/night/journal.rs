@@ -80,7 +80,11 @@ mod tests {
         let (mut journal, none) = Journal::open(&path, &names, 2).unwrap();
         assert!(none.is_empty());
         journal.add(&rows[..5]).unwrap();
-        fs::write(&path, [&fs::read(&path).unwrap()[..], b"{\"frame\":"].concat()).unwrap();
+        fs::write(
+            &path,
+            [&fs::read(&path).unwrap()[..], b"{\"frame\":"].concat(),
+        )
+        .unwrap();
         let (mut journal, kept) = Journal::open(&path, &names, 2).unwrap();
         assert_eq!(kept, rows[..4]);
         journal.add(&rows[4..]).unwrap();

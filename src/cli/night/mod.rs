@@ -5,6 +5,7 @@ mod files;
 mod hot;
 mod journal;
 mod order;
+mod page;
 mod run;
 mod text;
 
@@ -45,11 +46,16 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
         let start = run.start(&names);
         let hot = hot::learn(&run, &names, &start);
         if let Some(pixels) = &hot {
-            let list = (arguments.out.join(files::HOT_PIXELS), hot::table(pixels)?.into_bytes());
+            let list = (
+                arguments.out.join(files::HOT_PIXELS),
+                hot::table(pixels)?.into_bytes(),
+            );
             write_whole(&[list])?;
         }
         let masked = match &hot {
-            Some(pixels) if arguments.mask_hot_pixels && !pixels.is_empty() => arguments.masked_calibration()?,
+            Some(pixels) if arguments.mask_hot_pixels && !pixels.is_empty() => {
+                arguments.masked_calibration()?
+            }
             _ => None,
         };
         let run = run.with_calibration(masked.as_ref());
@@ -67,7 +73,8 @@ fn claim(
 ) -> Result<(), CommandError> {
     let directory = &arguments.out;
     make_directory(directory)?;
-    let is_foreign = |name: &&&str| directory.join(name).exists() && !directory.join(files::RUN).exists();
+    let is_foreign =
+        |name: &&&str| directory.join(name).exists() && !directory.join(files::RUN).exists();
     if let Some(name) = files::NAMES.iter().find(is_foreign) {
         return Err(CommandError::usage(format_args!(
             "{} has {name} and no {}: it is not of a night; choose another directory for --out",
@@ -127,10 +134,21 @@ fn finish(
         location: arguments.station.location.clone(),
         site: start.site,
     };
-    let about = || vec![format!("{MEASURED_BY} {} in frames of a night", env!("CARGO_PKG_VERSION"))];
+    let about = || {
+        vec![format!(
+            "{MEASURED_BY} {} in frames of a night",
+            env!("CARGO_PKG_VERSION")
+        )]
+    };
     let lens = start.lens.as_ref().map(|lens| lens.to_toml(&about()));
     let directory: &Path = &arguments.out;
-    write_whole(&files::of_rows(directory, rows, &night, &station, lens)?)?;
+    let mut results = files::of_rows(directory, rows, &night, &station)?;
+    results.extend(lens.map(|lens| (directory.join(files::LENS), lens.into_bytes())));
+    if arguments.html {
+        let page = page::of(rows, &night, &files::csv(rows)?)?;
+        results.push(super::page::file(&directory.join(files::PAGE), &page)?);
+    }
+    write_whole(&results)?;
     let exit = if night.unread > 0 {
         Exit::Failure
     } else if night.identified == 0 {

@@ -9,7 +9,11 @@ use std::path::Path;
 
 /// Sorts `names` by their dates: those in the names, if all have one with its time, else those of the
 /// headers. Frames without a date are last, in the order that they were given in.
-pub(super) fn by_date(names: Vec<String>, pool: &rayon::ThreadPool, memory: MemoryLimit) -> Vec<String> {
+pub(super) fn by_date(
+    names: Vec<String>,
+    pool: &rayon::ThreadPool,
+    memory: MemoryLimit,
+) -> Vec<String> {
     let in_name = |name: &String| seconds(ObservationDate::in_file_name(Path::new(name)).as_ref());
     let in_names: Vec<Option<f64>> = names.iter().map(in_name).collect();
     let dates = if in_names.iter().all(Option::is_some) {
@@ -32,11 +36,7 @@ fn seconds(date: Option<&ObservationDate>) -> Option<f64> {
 
 /// The dates in the files, or in the names where these have none. Frames that cannot be read have none: why
 /// is said when they are solved.
-fn in_headers(
-    names: &[String],
-    pool: &rayon::ThreadPool,
-    memory: MemoryLimit,
-) -> Vec<Option<f64>> {
+fn in_headers(names: &[String], pool: &rayon::ThreadPool, memory: MemoryLimit) -> Vec<Option<f64>> {
     let buffers = || {
         let mut buffers = Buffers::new();
         buffers.set_memory(memory);
@@ -47,7 +47,10 @@ fn in_headers(
         let frame = read_frame(path, None, buffers).ok()?;
         let date = frame.metadata.date;
         buffers.recycle(frame);
-        seconds(date.or_else(|| ObservationDate::in_file_name(path)).as_ref())
+        seconds(
+            date.or_else(|| ObservationDate::in_file_name(path))
+                .as_ref(),
+        )
     };
     let mut dates = Vec::with_capacity(names.len());
     for_each_ordered(pool, names, buffers, read, |_, date| {

@@ -87,7 +87,9 @@ impl<'a> Run<'a> {
             let solver = self.solver(self.context.clone(), Probes);
             solver.solve_all(&paths, |images| {
                 // Frames that cannot be read are reported with their rows.
-                let found = images.into_iter().filter_map(|(_, probe)| probe.ok().flatten());
+                let found = images
+                    .into_iter()
+                    .filter_map(|(_, probe)| probe.ok().flatten());
                 probes.extend(found);
                 ControlFlow::Continue(())
             });
@@ -100,7 +102,12 @@ impl<'a> Run<'a> {
     }
 
     /// The rows of a batch.
-    fn batch(&self, names: &[String], measured: &Measured, progress: &ProgressBar) -> Vec<NightRow> {
+    fn batch(
+        &self,
+        names: &[String],
+        measured: &Measured,
+        progress: &ProgressBar,
+    ) -> Vec<NightRow> {
         let mut context = self.context.clone();
         context.lens = measured.start.lens.clone();
         context.held = measured.held().map(Arc::new);

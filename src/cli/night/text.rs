@@ -32,8 +32,16 @@ pub(super) fn text(night: &NightSummary) -> String {
         ("zenith", median.zenith_mag_arcsec2, " mag/arcsec²"),
         ("limit", median.limit_vmag, " V"),
         ("minus expected", median.limit_difference_mag, " mag"),
-        ("extinction", median.extinction_mag_per_airmass, " mag per airmass"),
-        ("clouds", median.cloud_share.map(|share| 100.0 * share), " %"),
+        (
+            "extinction",
+            median.extinction_mag_per_airmass,
+            " mag per airmass",
+        ),
+        (
+            "clouds",
+            median.cloud_share.map(|share| 100.0 * share),
+            " %",
+        ),
     ];
     let values = values
         .into_iter()
@@ -43,7 +51,11 @@ pub(super) fn text(night: &NightSummary) -> String {
         let _ = writeln!(text, "medians    {}", values.join(", "));
     }
     if let Some(pixels) = night.hot_pixels.filter(|pixels| *pixels > 0) {
-        let _ = writeln!(text, "hot        {}, listed in hot-pixels.csv", counted(pixels, "pixel"));
+        let _ = writeln!(
+            text,
+            "hot        {}, listed in hot-pixels.csv",
+            counted(pixels, "pixel")
+        );
     }
     for moment in &night.moments {
         let _ = writeln!(text, "{:<10} {}", time_of(&moment.date), moment.to_text());
@@ -58,5 +70,9 @@ fn or_dash(text: &str) -> &str {
 /// The time of a date, to the second.
 fn time_of(date: &str) -> String {
     let time = date.split_once('T').map_or(date, |(_, time)| time);
-    time.chars().take(8).collect::<String>().trim_end_matches('Z').to_owned()
+    time.chars()
+        .take(8)
+        .collect::<String>()
+        .trim_end_matches('Z')
+        .to_owned()
 }
