@@ -39,6 +39,8 @@ EXTINCTION_MAG, SKY_MAG, EXPOSURE_S = 0.17, 21.0, 20
 # Hours after the start.
 CLOUDS_H, CLOUDS_LAST_H, CLOUDS_FROM_DEG = 3.0, 2.0, 245.0
 BANK_PX = 500
+# Share of the sky above 10° from which on there are clouds.
+CLOUDED = 0.05
 KNOCK_H, KNOCK_DEG = 6.5, 2.0
 DEW_H = 8.0
 # The boresight and the position of image-up, before the knock.
@@ -178,7 +180,7 @@ class Night:
         spot, dimmed = SPOT_PX, 0.0
         if hour > DEW_H:
             spot, dimmed = SPOT_PX * (1 + 0.25 * (hour - DEW_H)), 0.3 * (hour - DEW_H)
-        options = [f"--ra={ra}", f"--dec={dec}", f"--roll={up}", f"--date={date:%Y-%m-%dT%H:%M:%SZ}", f"--site={SITE}", f"--exposure={EXPOSURE_S}", f"--sky-mag-arcsec2={SKY_MAG + dimmed}", f"--extinction={EXTINCTION_MAG}", "--by-altitude=1", f"--seed={number}", f"--spot-sigma={spot}"]
+        options = [f"--ra={ra}", f"--dec={dec}", f"--roll={up}", f"--date={date:%Y-%m-%dT%H:%M:%SZ}", f"--site={SITE}", f"--exposure={EXPOSURE_S}", f"--sky-mag-arcsec2={SKY_MAG + dimmed}", f"--extinction={EXTINCTION_MAG}", "--by-altitude=1", "--hot-pixels-per-mpx=60", "--hot-pixel-e-s=1000", f"--seed={number}", f"--spot-sigma-px={spot}"]
         if dimmed:
             options.append(f"--lens-transmission={0.87 * 10 ** (-0.4 * dimmed)}")
         altitude, azimuth, phase = moon(date)
@@ -205,6 +207,25 @@ class Night:
         self.run("night", f"--site={SITE}", f"--camera={self.camera}", f"--out={out}", self.directory / "frames")
         return json.loads((out / "night.json").read_text())
 
+    def covered(self, number):
+        """Share of the sky above 10° behind the bank."""
+        if not self.has_clouds(number):
+            return 0.0
+        front, is_knocked = self.front_px(self.hour(number)), self.hour(number) >= KNOCK_H
+        boresight, up = axes(is_knocked)
+        direction = math.radians(image_direction_deg(unit(0.0, CLOUDS_FROM_DEG), is_knocked))
+        right, inside, all_of_it = cross(boresight, up), 0, 0
+        for step in range(4000):
+            # Even over the sphere.
+            height = math.sin(math.radians(10)) + (1 - math.sin(math.radians(10))) * (step + 0.5) / 4000
+            place = unit(math.degrees(math.asin(height)), 222.492 * step % 360)
+            radius = FOCAL_PX * math.acos(dot(place, boresight))
+            x, y = dot(place, right), dot(place, up)
+            along = radius * (x * math.sin(direction) + y * math.cos(direction)) / math.hypot(x, y)
+            inside += front < along < front + BANK_PX
+            all_of_it += 1
+        return inside / all_of_it
+
     def first(self, hour):
         """Number of the first frame at or after an hour."""
         return next(n for n in range(self.frames) if self.hour(n) >= hour)
@@ -212,12 +233,13 @@ class Night:
 
 def compared(night, found):
     """Lines of what should be found, and what is; whether all is."""
+    clouded = [n for n in range(night.frames) if night.covered(n) > CLOUDED]
     # The upper limb, refracted.
     rises = next((n for n in range(1, night.frames) if moon(night.date(n - 1))[0] < -0.83 <= moon(night.date(n))[0]), None)
     expected = [
         ("moonrise", rises, None),
-        ("clouds_come", night.first(CLOUDS_H), CLOUDS_FROM_DEG),
-        ("clouds_go", night.first(CLOUDS_H + CLOUDS_LAST_H), (CLOUDS_FROM_DEG + 180) % 360),
+        ("clouds_come", clouded[0], CLOUDS_FROM_DEG),
+        ("clouds_go", clouded[-1] + 1, (CLOUDS_FROM_DEG + 180) % 360),
         ("knock", night.first(KNOCK_H), None),
         ("dew", night.first(DEW_H), None),
     ]

@@ -3,7 +3,7 @@
 //! Usual is the median of the lowest third of the values. The noise is that of the differences of
 //! neighbors, which slow changes hardly add to. The series departs where three values in a row are above
 //! the usual by more than four standard deviations and by a least step, and returns where three in a row
-//! are not.
+//! are not. It began to depart where it came above a third of that.
 //!
 //! The median of the lowest third is 0.97 standard deviations below the middle of a series of normal noise.
 //! So such a series departs with a probability of (1 − Φ(3.03))³ = 2 × 10⁻⁹ at each frame, or 4 × 10⁻⁶ in
@@ -16,6 +16,9 @@ use crate::base::statistics::median;
 const IN_A_ROW: usize = 3;
 /// Standard deviations above the usual.
 const SIGMAS: f64 = 4.0;
+
+/// Part of the way to the limit at which a departure begins or ends.
+const BEGUN: f64 = 1.0 / 3.0;
 
 /// A part of a series that is not usual.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,19 +35,25 @@ pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departu
     let known: Vec<(usize, f64)> = known
         .filter_map(|(at, value)| Some((at, (*value)?)))
         .collect();
-    let Some(limit) = limit(&known, least_step) else {
+    let Some([usual, limit]) = bounds(&known, least_step) else {
         return Vec::new();
     };
+    let is_begun = |value: f64| value > usual + BEGUN * (limit - usual);
     let mut found: Vec<Departure> = Vec::new();
     let mut is_away = false;
-    for window in known.windows(IN_A_ROW) {
-        let start = window[0].0;
+    for (at, window) in known.windows(IN_A_ROW).enumerate() {
         if !is_away && window.iter().all(|(_, value)| *value > limit) {
+            let begun = known[..at].iter().rev();
+            let before = found.last().and_then(|last| last.end).unwrap_or(0);
+            let begun = begun.take_while(|(start, value)| *start > before && is_begun(*value));
+            let begun = begun.last();
+            let start = begun.unwrap_or(&window[0]).0;
             found.push(Departure { start, end: None });
             is_away = true;
         } else if is_away && window.iter().all(|(_, value)| *value <= limit) {
+            let over = window.iter().find(|(_, value)| !is_begun(*value));
             if let Some(last) = found.last_mut() {
-                last.end = Some(start);
+                last.end = Some(over.unwrap_or(&window[0]).0);
             }
             is_away = false;
         }
@@ -52,8 +61,8 @@ pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departu
     found
 }
 
-/// The value above which a series is not usual.
-fn limit(known: &[(usize, f64)], least_step: f64) -> Option<f64> {
+/// What is usual of a series, and the value above which it is not.
+fn bounds(known: &[(usize, f64)], least_step: f64) -> Option<[f64; 2]> {
     /// Standard deviation over the median size of a difference of two.
     const PER_DIFFERENCE: f64 = 1.4826 / std::f64::consts::SQRT_2;
     if known.len() < 2 * IN_A_ROW {
@@ -65,7 +74,7 @@ fn limit(known: &[(usize, f64)], least_step: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let lowest = values.len().div_ceil(3);
     let usual = median(&mut values[..lowest]);
-    Some(usual + (SIGMAS * sigma).max(least_step))
+    Some([usual, usual + (SIGMAS * sigma).max(least_step)])
 }
 
 #[cfg(test)]

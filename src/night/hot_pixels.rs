@@ -1,9 +1,10 @@
 //! Hot pixels, learned from the sky's motion: stars move on, hot pixels stay.
 //!
-//! frames spread over a night, in the rows of their files → [`HotPixels`]
+//! frames spread over a night, in the rows of their files → [`NightHotPixel`] for each
 //!
-//! A pixel stands out in a frame if it is brighter than the median of eight others around it, two pixels
-//! away, by ten standard deviations of such differences: so the filters of a mosaic are alike. Hot is what
+//! A pixel stands out in a frame if it is brighter than all but one of eight others around it by ten
+//! standard deviations. These are two pixels away, so that filters of a mosaic are alike. The noise is that of
+//! differences to their median. Hot is what
 //! stands out in three quarters of the frames.
 //!
 //! Caveats: lamps and their reflections stand still, too. Where the sky moves by less than three pixels
@@ -42,7 +43,7 @@ pub struct NightHotPixel {
     pub y: usize,
     /// Frames in which it stands out, of those that were looked at.
     pub share: f64,
-    /// How much brighter it is than the pixels around it, in ADU.
+    /// How much brighter it is than all but one of eight pixels around it, in ADU.
     pub excess_adu: f64,
 }
 
@@ -59,22 +60,24 @@ pub struct Standouts {
 impl Standouts {
     /// Those of a frame in the rows of its file, which was taken at `mjd`.
     pub fn of(frame: &Frame, mjd: Option<f64>) -> Self {
+        /// One of so many pixels tells the noise.
+        const SAMPLED: usize = 7;
+        /// Standard deviation of normal noise over its median size.
+        const PER_MEDIAN: f64 = 1.4826;
         let (width, height) = (frame.width, frame.height);
         let mut all = Vec::new();
         let mut sample = Vec::new();
         for y in 2..height.saturating_sub(2) {
             for x in 2..width.saturating_sub(2) {
-                let excess_adu = excess_adu(frame, x, y);
-                if (x + y) % 7 == 0 && excess_adu.is_finite() {
-                    sample.push(f64::from(excess_adu.abs()));
+                let [above_median_adu, above_all_adu] = above_others_adu(frame, x, y);
+                if (x + y) % SAMPLED == 0 && above_median_adu.is_finite() {
+                    sample.push(f64::from(above_median_adu.abs()));
                 }
-                if excess_adu > 0.0 {
-                    all.push((y * width + x, excess_adu));
+                if above_all_adu > 0.0 {
+                    all.push((y * width + x, above_all_adu));
                 }
             }
         }
-        /// Standard deviation of normal noise over its median size.
-        const PER_MEDIAN: f64 = 1.4826;
         let noise_adu = if sample.is_empty() {
             f64::INFINITY
         } else {
@@ -91,16 +94,17 @@ impl Standouts {
     }
 }
 
-/// How much brighter a pixel is than the median of eight around it.
-fn excess_adu(frame: &Frame, x: usize, y: usize) -> f32 {
-    let mut around = [0.0_f32; 8];
+/// How much brighter a pixel is than the median of eight around it, and than all but one of them.
+fn above_others_adu(frame: &Frame, x: usize, y: usize) -> [f32; 2] {
     let rows = [y - 2, y - 2, y - 2, y, y, y + 2, y + 2, y + 2];
     let columns = [x - 2, x, x + 2, x - 2, x + 2, x - 2, x, x + 2];
+    let mut around = [0.0_f32; 8];
     for ((value, y), x) in around.iter_mut().zip(rows).zip(columns) {
         *value = frame.at(x, y);
     }
     around.sort_unstable_by(f32::total_cmp);
-    frame.at(x, y) - 0.5 * (around[3] + around[4])
+    let own = frame.at(x, y);
+    [own - 0.5 * (around[3] + around[4]), own - around[6]]
 }
 
 /// The hot pixels of frames of one size; `None` where they are too few.

@@ -19,6 +19,11 @@ const LEAST_WIDENING: f64 = 0.05;
 /// and of the stars' brightness, in magnitudes.
 const LEAST_DIMMING_MAG: f64 = 0.1;
 
+/// Frames in which clouds come, or go,
+const BEGINNING: usize = 2;
+/// and clear ones that they are compared with.
+const COMPARED: usize = 3;
+
 /// What changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -151,18 +156,21 @@ impl<'a> Series<'a> {
     /// When clouds come and go, and from where to where.
     fn clouds(&self) -> Vec<Moment> {
         let shares: Vec<Option<f64>> = self.rows.iter().map(|row| row.cloud_share).collect();
+        let known = |at: &usize| self.rows[*at].cells.is_some();
         let mut moments = Vec::new();
         for Departure { start, end } in departures(&shares, LEAST_CLOUDS) {
+            let clear = (0..start).rev().filter(known).take(COMPARED);
+            let cloudy = (start..self.rows.len()).filter(known).take(BEGINNING);
             let come = self.at(MomentKind::CloudsCome, start).map(|moment| Moment {
-                azimuth_deg: self.clouds_from_deg(start),
+                azimuth_deg: self.clouds_deg(cloudy, clear),
                 ..moment
             });
             let go = end.and_then(|end| {
-                let moment = self.at(MomentKind::CloudsGo, end)?;
-                let last = (start..end).rev().find(|at| shares[*at].is_some())?;
+                let clear = (end..self.rows.len()).filter(known).take(COMPARED);
+                let cloudy = (start..end).rev().filter(known).take(BEGINNING);
                 Some(Moment {
-                    azimuth_deg: self.clouds_from_deg(last),
-                    ..moment
+                    azimuth_deg: self.clouds_deg(cloudy, clear),
+                    ..self.at(MomentKind::CloudsGo, end)?
                 })
             });
             // What the night begins with does not come.
@@ -173,15 +181,23 @@ impl<'a> Series<'a> {
         moments
     }
 
-    /// The mean azimuth of the clouds in a frame, from north through east, in degrees.
-    fn clouds_from_deg(&self, frame: usize) -> Option<f64> {
-        let NightCells { clear, .. } = self.rows[frame].cells.as_ref()?;
+    /// The mean azimuth of the clouds that are in the frames `cloudy` and not in those `clear`, from north
+    /// through east, in degrees.
+    fn clouds_deg(
+        &self,
+        cloudy: impl Iterator<Item = usize>,
+        clear: impl Iterator<Item = usize>,
+    ) -> Option<f64> {
+        let middles = middles_deg();
+        let [cloudy, clear] = [
+            self.mean_clouds(cloudy, middles.len()),
+            self.mean_clouds(clear, middles.len()),
+        ];
         let (mut east, mut north) = (0.0, 0.0);
-        for ([altitude_deg, azimuth_deg], clear) in middles_deg().into_iter().zip(clear) {
-            let Some(clear) = clear.filter(|clear| *clear < 0.5) else {
-                continue;
-            };
-            let weight = f64::from(1.0 - clear) * libm::cos(altitude_deg * RAD_PER_DEG);
+        for (cell, [altitude_deg, azimuth_deg]) in middles.into_iter().enumerate() {
+            let Some(cloudy) = cloudy[cell] else { continue };
+            let weight = cloudy - clear[cell].unwrap_or(0.0);
+            let weight = weight * libm::cos(altitude_deg * RAD_PER_DEG);
             let (sin, cos) = libm::sincos(azimuth_deg * RAD_PER_DEG);
             east += weight * sin;
             north += weight * cos;
@@ -190,6 +206,21 @@ impl<'a> Series<'a> {
         (east != 0.0 || north != 0.0)
             .then(|| finite(turn_rad * DEG_PER_RAD, 0))
             .flatten()
+    }
+
+    /// The mean probability of clouds in each cell of some frames.
+    fn mean_clouds(&self, frames: impl Iterator<Item = usize>, cells: usize) -> Vec<Option<f64>> {
+        let mut sums = vec![(0.0, 0.0); cells];
+        for NightCells { clear, .. } in frames.filter_map(|at| self.rows[at].cells.as_ref()) {
+            for (sum, clear) in sums.iter_mut().zip(clear) {
+                if let Some(clear) = clear {
+                    sum.0 += f64::from(1.0 - clear);
+                    sum.1 += 1.0;
+                }
+            }
+        }
+        let mean = |(sum, count)| (count > 0.0).then(|| sum / count);
+        sums.into_iter().map(mean).collect()
     }
 
     /// When stars grow wider or dimmer.

@@ -251,7 +251,6 @@ fn solve(
         dropped_scale,
         more_stars,
         defects: &prepared.defects,
-        held: None,
         photometry: None,
         sky: None,
     };

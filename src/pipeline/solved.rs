@@ -46,8 +46,6 @@ pub(super) struct SolvedFrame<'a> {
     pub more_stars: Option<usize>,
     /// Columns that hold no light, and were left out.
     pub defects: &'a [DefectiveColumn],
-    /// What the frame is if the camera stands as it is held, where its stars are not identified.
-    pub held: Option<Identification>,
     pub photometry: Option<FramePhotometry>,
     /// The sky at each place.
     pub sky: Option<SkyMap>,
@@ -67,10 +65,11 @@ impl SolvedFrame<'_> {
     /// Measures the sky at each place of an identified frame, where it is wanted, or of one whose camera is
     /// held. `comparison` is with the stated camera.
     pub(super) fn measure_sky(&mut self, comparison: Option<&Comparison>) {
-        if self.outcome.identification().is_none() {
-            self.held = self.as_held();
-        }
-        let Some(identification) = self.outcome.identification().or(self.held.as_ref()) else {
+        let held = match self.outcome {
+            Outcome::Identified(_) => None,
+            Outcome::NotIdentified(_) => self.as_held(),
+        };
+        let Some(identification) = self.outcome.identification().or(held.as_ref()) else {
             return;
         };
         let camera = self.context.camera.as_ref().map(|camera| &camera.sheet);
@@ -88,9 +87,13 @@ impl SolvedFrame<'_> {
         };
         let frame = self.identified_frame(identification);
         let limit_vmag = comparison.map(|comparison| comparison.limit_vmag);
-        let held = self.context.held.as_ref();
-        let usual = held.and_then(|held| held.clear_sky.as_ref());
-        self.sky = sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag, usual);
+        let usual = self.context.held.as_ref();
+        let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
+        let measured =
+            |usual| sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag, usual);
+        // Stars that were paired by their places alone tell no zero point.
+        let own = held.is_none().then(|| measured(None)).flatten();
+        self.sky = own.or_else(|| measured(Some(usual?)));
     }
 
     fn as_held(&self) -> Option<Identification> {

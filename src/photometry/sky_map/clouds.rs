@@ -109,6 +109,11 @@ impl Sky<'_> {
     }
 }
 
+/// The probability beforehand that the sky is clear.
+pub(super) fn prior_clear() -> f64 {
+    posterior(&[0.0; STEPS]).0
+}
+
 /// The probability that the sky is clear, and the extinction, from the logarithms of the likelihoods of
 /// extinctions.
 fn posterior(ln_likelihoods: &[f64; STEPS]) -> (f64, Estimate) {
