@@ -52,8 +52,8 @@ process: identify --pixel-scale 10 OUT/tables/orion.csv
 simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
 process: sky --camera docs/start/all-sky.toml --site 47,8,500 OUT/sky.tif
 process: sky fixtures/orion/orion.png
-simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:10Z --ra 65.32 --dec 46.93 --out OUT/allsky/later.tif
-simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/allsky/first.tif
+simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:10Z --ra 65.32 --dec 46.93 --first 1 --out OUT/allsky
+simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --first 0 --out OUT/allsky
 night: night --camera docs/start/all-sky.toml --site 47,8,500 --out OUT/a-night OUT/allsky
 night_frame: file OUT/a-night/night.jsonl
 calibrate: calibrate --site 47,8,500 OUT/night fixtures/regression/no-stars.tif -o OUT/lens.toml
