@@ -201,7 +201,7 @@ impl ClearSky {
 
     /// V magnitude of a star of B−V 0.6 at the zenith that gives 1 ADU in a second at the frame's centre; without
     /// a horizon, of one seen through the air.
-    pub fn ground_vmag(&self) -> f64 {
+    pub(crate) fn ground_vmag(&self) -> f64 {
         let extinction_mag = if self.has_horizon {
             self.extinction_mag.value
         } else {
