@@ -52,6 +52,10 @@ process: identify --pixel-scale 10 OUT/tables/orion.csv
 simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
 process: sky --camera docs/start/all-sky.toml --site 47,8,500 OUT/sky.tif
 process: sky fixtures/orion/orion.png
+simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:10Z --ra 65.32 --dec 46.93 --first 1 --out OUT/allsky
+simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --first 0 --out OUT/allsky
+night: night --camera docs/start/all-sky.toml --site 47,8,500 --out OUT/a-night OUT/allsky
+night_frame: file OUT/a-night/night.jsonl
 calibrate: calibrate --site 47,8,500 OUT/night fixtures/regression/no-stars.tif -o OUT/lens.toml
 process: process --camera OUT/lens.toml --site 47,8,500 OUT/night/frame-00000.tif
 track: track --interval 0.1 OUT/still
@@ -87,7 +91,10 @@ def strict(schema):
 
 
 def objects(program, arguments, is_json):
-    """The objects that a command prints."""
+    """The objects that a command prints, or that are in a file."""
+    if arguments.startswith("file "):
+        lines = pathlib.Path(arguments.removeprefix("file ")).read_text().splitlines()
+        return [json.loads(line) for line in lines]
     command = [program, *shlex.split(arguments), *(["--format", "json"] if is_json else [])]
     command = " ".join(word if "*" in word else shlex.quote(word) for word in command)
     ran = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -54,6 +54,7 @@
 //! | [`lens`] | which lens, from several frames of a camera at once |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
+//! | `night` | what does a night of one camera show: its series, and what changes when |
 //! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
 //! | `study` | is it good enough: validation, robustness, defocus, the papers' experiments |
 //!
@@ -77,6 +78,8 @@ pub mod frame;
 pub mod identify;
 pub mod lens;
 pub mod model;
+#[doc(hidden)]
+pub mod night;
 pub mod photometry;
 pub mod pipeline;
 pub mod report;

@@ -21,6 +21,16 @@ pub struct Configuration {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mask: Option<FileHash>,
     pub page: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub night: Option<NightConfiguration>,
+}
+
+/// What the rows of a night depend on besides.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[expect(missing_docs, reason = "named as the options of `night`")]
+pub struct NightConfiguration {
+    pub utc_offset_h: Option<f64>,
+    pub mask_hot_pixels: bool,
 }
 
 /// Which catalogue was used.

@@ -51,10 +51,7 @@ impl Archive {
             });
         }
         let identity = Identity::new(&plan, configuration).map_err(ArchiveError::json(&path))?;
-        if !is_claimed(&path, identity.text())? {
-            // Another worker may have been faster.
-            check_same(directory, &path, &identity)?;
-        }
+        claim_file(directory, IDENTITY, &identity)?;
         make_directory(&directory.join(FRAMES))?;
         make_directory(&directory.join(STARS))?;
         let archive = Self {
@@ -210,6 +207,20 @@ impl<R> OpenTable<R> {
             .map_err(ArchiveError::table("writing", &path))?;
         files::finish(written, &path).map_err(ArchiveError::file("writing", &path))
     }
+}
+
+/// Takes `directory` for a run by a file of this name in it.
+///
+/// # Errors
+/// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::File`],
+/// [`ArchiveError::Json`].
+pub fn claim_file(directory: &Path, name: &str, identity: &Identity) -> Result<(), ArchiveError> {
+    let path = directory.join(name);
+    if !is_claimed(&path, identity.text())? {
+        // Another worker may have been faster.
+        check_same(directory, &path, identity)?;
+    }
+    Ok(())
 }
 
 /// Writes the identity unless there is one; says whether it was written.

@@ -27,8 +27,8 @@ mod status;
 mod votable;
 mod write;
 
-pub use configuration::{CatalogIdentity, Configuration, FileHash};
-pub use directory::{Archive, PartWriter};
+pub use configuration::{CatalogIdentity, Configuration, FileHash, NightConfiguration};
+pub use directory::{Archive, PartWriter, claim_file};
 pub use error::ArchiveError;
 pub use frame_row::FrameRow;
 pub use frames::{FrameSummary, frames};

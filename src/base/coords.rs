@@ -29,6 +29,10 @@ pub struct Icrs;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Camera;
 
+/// The sky of a site: x to the east, y to the north, z to the zenith.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Horizon;
+
 /// A position in the image, in pixels; (0, 0) is the centre of the top-left pixel, y runs down.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PixelPoint {

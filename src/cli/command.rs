@@ -11,6 +11,7 @@ use super::experiment::ExperimentArgs;
 use super::flats::FlatsArgs;
 use super::identify::IdentifyArgs;
 use super::limit::LimitArgs;
+use super::night::NightArgs;
 use super::process::ProcessArgs;
 use super::robustness::RobustnessArgs;
 use super::shell::{CompletionsArgs, ManArgs};
@@ -63,6 +64,8 @@ pub(crate) enum Command {
         else by columns and rows of the frame. The brightness needs the level of a pixel without light: --dark\n\
         or --camera.")]
     Sky(Box<ProcessArgs>),
+    /// Measure a night of one camera on its mount: sky, clouds, limits, pointing, and what changes when
+    Night(Box<NightArgs>),
     /// Show the progress of an archive run, merge its tables, and report each night
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)

@@ -22,6 +22,7 @@ mod flats;
 mod identify;
 mod input;
 mod limit;
+mod night;
 mod options;
 mod output;
 mod page;
@@ -86,6 +87,7 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Catalog(arguments) => catalog::catalog(arguments),
         Command::Robustness(arguments) => robustness::robustness(&arguments),
         Command::Clutter(arguments) => clutter::clutter(&arguments),
+        Command::Night(arguments) => night::night(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
         Command::Defocus(arguments) => defocus::defocus(&arguments),

@@ -4,9 +4,25 @@ use clap::Command;
 
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
-const SHOWN: [(&str, [&[&str]; 2]); 11] = [
+const SHOWN: [(&str, [&[&str]; 2]); 12] = [
     ("process", [&["dark", "mask", "draw"], &SOLVING]),
     ("sky", [&["dark", "flat", "mask"], &SOLVING]),
+    (
+        "night",
+        [
+            &[
+                "out",
+                "html",
+                "dark",
+                "flat",
+                "mask",
+                "utc_offset",
+                "quiet",
+                "fov",
+            ],
+            &["site", "camera", "format", "threads", "catalog"],
+        ],
+    ),
     ("identify", [&["width", "height"], &SOLVING]),
     (
         "track",

@@ -243,6 +243,7 @@ pub fn solve_centroids(
         observation,
         site: priors.site,
         exposure_s: priors.exposure_s,
+        spot_sigma_px: None,
         sources,
         background: None,
         attitude_only: context.attitude_only,

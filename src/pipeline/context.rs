@@ -1,5 +1,6 @@
 //! What the stages need and what does not change from frame to frame.
 
+use super::held::HeldCamera;
 use crate::base::epoch::ObservationDate;
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
@@ -9,6 +10,7 @@ use crate::frame::{self, Frame};
 use crate::identify::{self, DateSource, Effort, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::places::AttitudeFrame;
+use jiff::SignedDuration;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,6 +32,12 @@ pub struct Context<'a> {
     pub camera: Option<ObservingSetup>,
     /// The lens with which they were taken, where it was measured.
     pub lens: Option<Arc<KnownLens>>,
+    /// What the dates in the names of files are ahead of UTC, where it is known.
+    #[doc(hidden)]
+    pub names_ahead_of_utc: Option<SignedDuration>,
+    /// How the camera stands, where it does not move: tried first.
+    #[doc(hidden)]
+    pub held: Option<Arc<HeldCamera>>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
@@ -60,6 +68,8 @@ impl<'a> Context<'a> {
             priors: Priors::default(),
             camera: None,
             lens: None,
+            names_ahead_of_utc: None,
+            held: None,
             calibration: None,
             attitude_only: false,
             measure_sky: false,
@@ -78,13 +88,18 @@ impl<'a> Context<'a> {
         let lens = self.lens_of(frame.width, frame.height);
         let camera_scale = self.camera.as_ref().map(|camera| &camera.sheet);
         let header_scale = header.pixel_scale_rad().map(ScalePrior::of_header);
+        let in_name = name.and_then(ObservationDate::in_file_name);
+        let (in_name, by_name) = match self.names_ahead_of_utc {
+            Some(ahead) => (
+                in_name.and_then(|date| date.earlier_by(ahead)),
+                DateSource::User,
+            ),
+            None => (in_name, DateSource::FileName),
+        };
         let priors = self
             .priors
             .or_date(header.date, DateSource::FileHeader)
-            .or_date(
-                name.and_then(ObservationDate::in_file_name),
-                DateSource::FileName,
-            );
+            .or_date(in_name, by_name);
         Priors {
             holds_lens: lens.is_some(),
             scale: priors

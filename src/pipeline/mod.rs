@@ -20,6 +20,7 @@ mod centroid_text;
 mod coarse_frames;
 mod context;
 mod error;
+mod held;
 mod identification;
 mod left_out;
 mod note;
@@ -45,6 +46,8 @@ pub use context::{Context, Workspace};
 pub use error::Error;
 #[doc(hidden)]
 pub use error::remedies_of;
+#[doc(hidden)]
+pub use held::HeldCamera;
 pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
 pub use options::SolveOptions;

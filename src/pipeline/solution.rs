@@ -35,6 +35,9 @@ pub struct Solution {
     pub site: Option<Site>,
     /// Exposure time, in seconds, if known.
     pub exposure_s: Option<f64>,
+    /// Standard deviation of the Gaussian spot before pixel integration, in pixels; a list of centroids has
+    /// none.
+    pub spot_sigma_px: Option<f64>,
     /// What is odd about the frame, its header, or the priors.
     pub notes: Vec<Note>,
     /// All sources, brightest first.

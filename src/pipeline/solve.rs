@@ -308,11 +308,23 @@ impl StarSearch<'_, '_> {
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
         let (outcome, places) = through_air_or_not(priors.places(), |places| {
-            let known = (priors, places);
-            let (outcome, dropped) =
-                identify_stars(frame, &detections, known, context, self.workspace, clock);
-            dropped_scale = dropped;
-            outcome
+            let held = context.held.as_ref();
+            let near = held.and_then(|held| held.near(priors, &places));
+            let mut outcome = None;
+            for priors in near.iter().chain([priors]) {
+                let known = (priors, places);
+                let (found, dropped) =
+                    identify_stars(frame, &detections, known, context, self.workspace, clock);
+                dropped_scale = dropped;
+                let is_identified = found.identification().is_some();
+                outcome = Some(found);
+                if is_identified {
+                    break;
+                }
+            }
+            outcome.unwrap_or(Outcome::NotIdentified(Reason::Search(
+                SearchFailure::Interrupted,
+            )))
         });
         Ok(Some(FoundStars {
             detections,
@@ -352,6 +364,7 @@ fn not_in_time(
         observation: None,
         site: priors.site,
         exposure_s: priors.exposure_s,
+        spot_sigma_px: None,
         notes: Note::of_file(&frame.metadata).collect(),
         sources: Vec::new(),
         background: None,

@@ -62,10 +62,14 @@ impl SolvedFrame<'_> {
         self.photometry = Some(photometry::measure(&frame, self.context.indexed));
     }
 
-    /// Measures the sky at each place of an identified frame, where it is wanted. `comparison` is with the
-    /// stated camera.
+    /// Measures the sky at each place of an identified frame, where it is wanted, or of one whose camera is
+    /// held. `comparison` is with the stated camera.
     pub(super) fn measure_sky(&mut self, comparison: Option<&Comparison>) {
-        let Some(identification) = self.outcome.identification() else {
+        let held = match self.outcome {
+            Outcome::Identified(_) => None,
+            Outcome::NotIdentified(_) => self.as_held(),
+        };
+        let Some(identification) = self.outcome.identification().or(held.as_ref()) else {
             return;
         };
         let camera = self.context.camera.as_ref().map(|camera| &camera.sheet);
@@ -83,14 +87,27 @@ impl SolvedFrame<'_> {
         };
         let frame = self.identified_frame(identification);
         let limit_vmag = comparison.map(|comparison| comparison.limit_vmag);
-        self.sky = sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag);
+        let usual = self.context.held.as_ref();
+        let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
+        let measured =
+            |usual| sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag, usual);
+        // Stars that were paired by their places alone tell no zero point.
+        let own = held.is_none().then(|| measured(None)).flatten();
+        self.sky = own.or_else(|| measured(Some(usual?)));
+    }
+
+    fn as_held(&self) -> Option<Identification> {
+        let size_px = [self.frame.width as f64, self.frame.height as f64];
+        let held = self.context.held.as_ref()?;
+        let places = self.priors.places();
+        held.identification(&self.detections, places, self.context.indexed, size_px)
     }
 
     fn identified_frame<'f>(&'f self, identification: &'f Identification) -> IdentifiedFrame<'f> {
         IdentifiedFrame {
             detections: &self.detections,
             identification,
-            places: self.places,
+            places: identification.places,
             exposure_s: self.priors.exposure_s,
             vignetting: self.stated_vignetting(),
         }
@@ -159,6 +176,7 @@ impl SolvedFrame<'_> {
             row_order: Some(self.frame.metadata.row_order),
             date: self.priors.date,
             exposure_s: self.priors.exposure_s,
+            spot_sigma_px: Some(self.detections.spot_sigma_px),
             notes: self.notes(comparison.as_ref()),
             sources: self.sources,
             background: Some(Background {

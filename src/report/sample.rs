@@ -19,6 +19,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         gain_e_per_adu: None,
         calibration: None,
         exposure_s: None,
+        spot_sigma_px: None,
         notes: Vec::new(),
         background: None,
         attitude_only: false,

@@ -274,7 +274,7 @@ fn place(cell: &SkyCellReport) -> String {
 ///
 /// # Reference
 /// Nuñez, Anderton & Renslow 2018, PLoS ONE 13, e0199239.
-fn color(value: f64) -> String {
+pub(crate) fn color(value: f64) -> String {
     const STOPS: [[f64; 3]; 6] = [
         [0.0, 34.0, 78.0],
         [53.0, 69.0, 108.0],

@@ -10,12 +10,12 @@
 //! Caveats: annual parallax (below 0.8″) and the deflection of light by the Sun (below 0.02″ beyond 15°
 //! from it) are left out.
 
-use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
+use crate::base::coords::{Camera, Horizon, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::sky::catalog::Star;
 use crate::sky::observer::airmass::airmass_kasten_young;
 use crate::sky::observer::{Air, Site, earth_velocity_c};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use std::f64::consts::FRAC_PI_2;
 
@@ -147,6 +147,18 @@ impl StarPlaces {
         Some(UnitVector::from_vector(
             along * cos_altitude + zenith * sin_altitude,
         ))
+    }
+
+    /// From apparent directions, in ICRS axes, to the axes of the site's horizon, if it is known.
+    #[doc(hidden)]
+    pub fn horizon(&self) -> Option<Rotation<Icrs, Horizon>> {
+        let Refraction { zenith, north, .. } = self.refraction.as_ref()?;
+        let east = north.as_vector().cross(zenith.as_vector());
+        Some(Rotation::from_matrix(Matrix3::from_rows(&[
+            east.transpose(),
+            north.as_vector().transpose(),
+            zenith.as_vector().transpose(),
+        ])))
     }
 
     /// Whether the air's horizon hides an apparent direction.

@@ -29,6 +29,7 @@ mod layering;
 mod lenses;
 mod limit;
 mod limits;
+mod night;
 mod no_sky;
 mod odd_use;
 mod orientation;

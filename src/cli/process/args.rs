@@ -56,22 +56,22 @@ pub(crate) struct ProcessArgs {
     pub(super) parts: PartOptions,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Calibration")]
 pub(crate) struct CalibrationOptions {
     /// Dark frame or master dark to subtract; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
-    pub(super) dark: Option<PathBuf>,
+    pub(crate) dark: Option<PathBuf>,
     /// Master flat: the signal above the dark level is divided by it; see `starpipe flats`
     #[arg(long, value_name = "FILE")]
-    pub(super) flat: Option<PathBuf>,
+    pub(crate) flat: Option<PathBuf>,
     /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
     #[arg(long, value_name = "FILE.csv")]
-    pub(super) hot_pixels: Option<PathBuf>,
+    pub(crate) hot_pixels: Option<PathBuf>,
     /// Image of the frame's size that is black where the frame does not show the sky: trees, houses,
     /// lamps
     #[arg(long, value_name = "FILE")]
-    pub(super) mask: Option<PathBuf>,
+    pub(crate) mask: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

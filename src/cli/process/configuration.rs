@@ -29,6 +29,7 @@ pub(super) fn configuration(
         hot_pixels: hash_of(hot_pixels)?,
         mask: hash_of(mask)?,
         page: arguments.page.and_then(text_of),
+        night: None,
     })
 }
 
@@ -42,7 +43,7 @@ fn text_of(page: PageChoice) -> Option<String> {
 }
 
 /// The hash of a file's content.
-fn hash_of(path: &Option<PathBuf>) -> anyhow::Result<Option<FileHash>> {
+pub(crate) fn hash_of(path: &Option<PathBuf>) -> anyhow::Result<Option<FileHash>> {
     let Some(path) = path else { return Ok(None) };
     let hash = FileHash::of_file(path).with_context(|| format!("reading {}", path.display()))?;
     Ok(Some(hash))

@@ -5,6 +5,7 @@ mod configuration;
 mod parts;
 
 pub(crate) use args::{CalibrationOptions, ProcessArgs};
+pub(crate) use configuration::hash_of;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::FrameList;

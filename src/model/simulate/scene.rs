@@ -44,6 +44,13 @@ pub struct Scene {
     pub cloud_size_px: f64,
     /// Light that the thickest cloud adds, relative to the clear sky.
     pub cloud_light: f64,
+    /// With it clouds are one bank: how far from the frame's centre its front is, towards
+    /// [`Self::cloud_bank_deg`], in pixels.
+    pub cloud_bank_px: Option<f64>,
+    /// Where the bank comes from, in degrees from image-up towards the right; from above by default.
+    pub cloud_bank_deg: Option<f64>,
+    /// Width of the bank, in pixels; it has no end by default.
+    pub cloud_bank_width_px: Option<f64>,
     /// Altitude up to which trees and houses hide the sky, in degrees; none without them. The zenith
     /// lies image-up from the centre, at the zenith distance of the scenario.
     pub skyline_deg: Option<f64>,
@@ -98,6 +105,9 @@ impl Default for Scene {
             cloud_mag: 0.0,
             cloud_size_px: 200.0,
             cloud_light: 0.0,
+            cloud_bank_px: None,
+            cloud_bank_deg: None,
+            cloud_bank_width_px: None,
             skyline_deg: None,
             skyline_relief_deg: 3.0,
             skyline_light: 0.2,
@@ -243,6 +253,21 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         cloud_light,
         Limits::NotNegative,
         "light that the thickest cloud adds, relative to the clear sky"
+    ),
+    optional_key!(
+        cloud_bank_px,
+        Limits::FromTo(-1e6, 1e6),
+        "one bank of clouds, whose front is so far from the centre, in pixels"
+    ),
+    optional_key!(
+        cloud_bank_deg,
+        ANGLES_DEG,
+        "where the bank comes from, in degrees from image-up towards the right (else from above)"
+    ),
+    optional_key!(
+        cloud_bank_width_px,
+        Limits::Positive,
+        "width of the bank, in pixels (else without end)"
     ),
     optional_key!(
         skyline_deg,

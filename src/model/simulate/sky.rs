@@ -44,7 +44,7 @@ impl<'a> Sky<'a> {
         let to_border_px = half_x * sin.abs() + half_y * cos.abs();
         let steepness = scene.sky_gradient / to_border_px;
         // Always drawn, so that later random numbers do not depend on the scene.
-        let clouds = Clouds::new(scene, random);
+        let clouds = Clouds::new(scene, camera, random);
         Self {
             camera,
             vignetting: scenario.camera.imperfections.vignetting,
@@ -167,10 +167,46 @@ struct Clouds {
     size_px: f64,
     /// Wave number along x and y in 1/px, and phase.
     waves: [[f64; 3]; WAVES],
+    bank: Option<Bank>,
+}
+
+/// One bank of clouds between two straight edges.
+struct Bank {
+    /// The frame's centre.
+    centre: PixelPoint,
+    /// Where it comes from, along x and y.
+    from: [f64; 2],
+    /// How far the front is from the centre, and the end behind it.
+    front_px: f64,
+    width_px: f64,
+    /// Distance from an edge at which the cloud is thickest.
+    edge_px: f64,
+}
+
+impl Bank {
+    fn new(scene: &Scene, camera: &CameraModel) -> Option<Self> {
+        /// Sizes of a cloud.
+        const EDGE: f64 = 0.1;
+        let (sin, cos) = libm::sincos(scene.cloud_bank_deg.unwrap_or(0.0).to_radians());
+        Some(Self {
+            centre: camera.centre(),
+            from: [sin, -cos],
+            front_px: scene.cloud_bank_px?,
+            width_px: scene.cloud_bank_width_px.unwrap_or(f64::INFINITY),
+            edge_px: EDGE * scene.cloud_size_px,
+        })
+    }
+
+    fn height(&self, place: &PixelPoint) -> f64 {
+        let [x, y] = self.from;
+        let along_px = x * (place.x - self.centre.x) + y * (place.y - self.centre.y);
+        let behind_px = along_px - self.front_px;
+        behind_px.min(self.width_px - behind_px) / self.edge_px
+    }
 }
 
 impl Clouds {
-    fn new(scene: &Scene, random: &mut ChaCha8Rng) -> Self {
+    fn new(scene: &Scene, camera: &CameraModel, random: &mut ChaCha8Rng) -> Self {
         let mut wave = || {
             let angle = random.random_range(0.0..std::f64::consts::TAU);
             let length_px = scene.cloud_size_px * random.random_range(1.0..3.0);
@@ -184,6 +220,7 @@ impl Clouds {
             light: scene.cloud_light,
             size_px: scene.cloud_size_px,
             waves: std::array::from_fn(|_| wave()),
+            bank: Bank::new(scene, camera),
         }
     }
 
@@ -195,6 +232,9 @@ impl Clouds {
 
     /// The random field; there is a cloud where it is above 0.
     fn height(&self, place: &PixelPoint) -> f64 {
+        if let Some(bank) = &self.bank {
+            return bank.height(place);
+        }
         let wave = |[a, b, phase]: [f64; 3]| libm::cos(a * place.x + b * place.y + phase);
         let sum: f64 = self.waves.map(wave).iter().sum();
         // The sum has a variance of half the number of waves: half of the sky is clear, a sixth

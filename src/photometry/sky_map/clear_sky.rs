@@ -230,6 +230,17 @@ impl ClearSky {
         }
     }
 
+    /// V magnitude of a star of B−V 0.6 at the zenith that gives 1 ADU in a second at the frame's centre; without
+    /// a horizon, of one seen through the air.
+    pub(crate) fn ground_vmag(&self) -> f64 {
+        let extinction_mag = if self.has_horizon {
+            self.extinction_mag.value
+        } else {
+            0.0
+        };
+        self.zero_point_vmag.value - extinction_mag
+    }
+
     /// What arrives at a place, over what arrives at the centre.
     pub(super) fn transmission(&self, off_centre_sq: f64) -> f64 {
         let [a, b] = VIGNETTING.map(|unknown| self.unknowns[unknown]);

@@ -43,6 +43,7 @@ impl Sky<'_> {
     /// Clouds in each cell.
     pub(super) fn clouds(&self, witnesses: &[Witness]) -> Vec<CellClouds> {
         let limit = RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance);
+        let limit = limit.or_else(|| self.is_usual.then(RelativeLimit::usual));
         let logs: Vec<[f64; STEPS]> = witnesses
             .iter()
             .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
@@ -102,6 +103,11 @@ impl Sky<'_> {
             likelihood.max(f64::MIN_POSITIVE).ln()
         })
     }
+}
+
+/// The probability beforehand that the sky is clear.
+pub(super) fn prior_clear() -> f64 {
+    posterior(&[0.0; STEPS]).0
 }
 
 /// The probability that the sky is clear, and the extinction, from the logarithms of the likelihoods of

@@ -48,6 +48,19 @@ struct Horizon {
     east: UnitVector<Icrs>,
 }
 
+/// The parts into which the sky above the horizon is divided, from the horizon up.
+pub fn horizon_places() -> Vec<Place> {
+    let ring = |ring: usize| {
+        let count = cells_in_ring(ring);
+        let breadth_deg = 360.0 / count as f64;
+        (0..count).map(move |cell| Place::Horizon {
+            altitude_deg: [ring as f64, ring as f64 + 1.0].map(|at| at * RING_DEG),
+            azimuth_deg: [cell as f64, cell as f64 + 1.0].map(|at| at * breadth_deg),
+        })
+    };
+    (0..RINGS).flat_map(ring).collect()
+}
+
 /// The parts of the sky over a frame.
 pub(super) struct Grid<'a> {
     found: &'a Identification,
@@ -74,22 +87,18 @@ impl<'a> Grid<'a> {
     }
 
     fn of_horizon(found: &'a Identification, horizon: Horizon, places: &StarPlaces) -> Self {
-        let mut cells = Vec::new();
-        let mut centers = Vec::new();
-        for ring in 0..RINGS {
-            let altitude_deg = [ring as f64, ring as f64 + 1.0].map(|at| at * RING_DEG);
-            let count = cells_in_ring(ring);
-            for cell in 0..count {
-                let breadth_deg = 360.0 / count as f64;
-                let azimuth_deg = [cell as f64, cell as f64 + 1.0].map(|at| at * breadth_deg);
-                let middle_rad = |range: [f64; 2]| 0.5 * (range[0] + range[1]) * RAD_PER_DEG;
-                centers.push(places.in_horizon(middle_rad(azimuth_deg), middle_rad(altitude_deg)));
-                cells.push(Place::Horizon {
-                    altitude_deg,
-                    azimuth_deg,
-                });
+        let cells = horizon_places();
+        let center = |place: &Place| match place {
+            Place::Horizon {
+                altitude_deg,
+                azimuth_deg,
+            } => {
+                let middle_rad = |range: &[f64; 2]| 0.5 * (range[0] + range[1]) * RAD_PER_DEG;
+                places.in_horizon(middle_rad(azimuth_deg), middle_rad(altitude_deg))
             }
-        }
+            Place::Frame { .. } => None,
+        };
+        let centers = cells.iter().map(center).collect();
         Self {
             found,
             places: cells,

@@ -34,6 +34,8 @@ pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
 pub use grid::Place;
 #[doc(hidden)]
+pub use grid::horizon_places;
+#[doc(hidden)]
 pub use picture::Picture;
 
 use super::IdentifiedFrame;
@@ -84,13 +86,15 @@ pub struct SkyCell {
     pub limit_vmag: Option<Estimate>,
 }
 
-/// Measures the sky over `frame`; `None` where too few stars tell the zero point.
+/// Measures the sky over `frame`; `None` where too few stars tell the zero point. If it is known from another
+/// frame of the camera, `usual` is the clear sky of that.
 #[doc(hidden)]
 pub fn measure(
     frame: &IdentifiedFrame,
     picture: &Picture,
     catalog: &IndexedCatalog,
     expected_limit_vmag: Option<f64>,
+    usual: Option<&ClearSky>,
 ) -> Option<SkyMap> {
     let view = SkyView {
         camera: &frame.identification.camera,
@@ -100,7 +104,10 @@ pub fn measure(
     let predicted = view.stars_to(catalog, super::depth_v_mag(frame, catalog));
     let association = associate(frame, &predicted);
     let stars = stars::of(frame, &association, &predicted, catalog);
-    let clear_sky = ClearSky::of(&stars, picture.is_flat)?;
+    let clear_sky = match usual {
+        Some(usual) => *usual,
+        None => ClearSky::of(&stars, picture.is_flat)?,
+    };
     let grid = Grid::over(frame);
     let levels = Levels::of(frame, picture, &grid, &clear_sky);
     let depths = depth::depths(&levels, &clear_sky);
@@ -113,6 +120,7 @@ pub fn measure(
         detections: frame.detections,
         exposure_s: levels.exposure_s,
         chance: association.chance,
+        is_usual: usual.is_some(),
     };
     let witnesses = sky.witnesses();
     let clouds = sky.clouds(&witnesses);
@@ -146,21 +154,73 @@ pub fn measure(
     })
 }
 
-/// Share of the sky that is behind clouds.
+/// Share of the sky that is behind clouds: the one for which what the cells show is most probable. Each cell
+/// counts by its solid angle, and tells how many times more probable it is with clouds than without.
+///
+/// The mean of what the cells show would be drawn to what is expected beforehand, the more so the fewer stars
+/// there are.
 fn cloud_share(cells: &[SkyCell]) -> Option<Estimate> {
-    let known = || {
-        cells
-            .iter()
-            .filter_map(|cell| Some((cell.solid_angle_sr, cell.clear?)))
+    const STEPS: usize = 200;
+    /// Probabilities nearer to 0 or 1 are not to be trusted.
+    const SURE: f64 = 0.005;
+    let prior = clouds::prior_clear();
+    let odds = |clear: f64| {
+        let clear = clear.clamp(SURE, 1.0 - SURE);
+        (1.0 - clear) / clear * prior / (1.0 - prior)
     };
-    let all_sr: f64 = known().map(|(solid_angle_sr, _)| solid_angle_sr).sum();
-    let mean = |of: &dyn Fn(f64, f64) -> f64| {
-        known()
-            .map(|(sr, clear)| of(sr / all_sr, clear))
-            .sum::<f64>()
+    let known = cells
+        .iter()
+        .filter_map(|cell| Some((cell.solid_angle_sr, odds(cell.clear?))));
+    let known: Vec<(f64, f64)> = known.collect();
+    let all_sr: f64 = known.iter().map(|(solid_angle_sr, _)| solid_angle_sr).sum();
+    if all_sr.is_nan() || all_sr <= 0.0 {
+        return None;
+    }
+    let mean = |of: &dyn Fn(f64) -> f64| {
+        let parts = known.iter().map(|(sr, odds)| sr / all_sr * of(*odds));
+        parts.sum::<f64>()
     };
-    (all_sr > 0.0).then(|| Estimate {
-        value: mean(&|share, clear| share * (1.0 - clear)),
-        sigma: mean(&|share, clear| share * share * clear * (1.0 - clear)).sqrt(),
+    let mut share = 0.5;
+    for _ in 0..STEPS {
+        share = mean(&|odds| share * odds / (share * odds + 1.0 - share));
+    }
+    let information = mean(&|odds| ((odds - 1.0) / (share * odds + 1.0 - share)).powi(2));
+    Some(Estimate {
+        value: share,
+        sigma: (information * known.len() as f64).sqrt().recip().min(0.5),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(clear: f64) -> SkyCell {
+        SkyCell {
+            place: Place::Frame {
+                x: [0.0, 1.0],
+                y: [0.0, 1.0],
+            },
+            solid_angle_sr: 0.01,
+            light: None,
+            expected: 0,
+            detected: 0,
+            extinction_mag: None,
+            clear: Some(clear),
+            expected_limit_vmag: None,
+            limit_vmag: None,
+        }
+    }
+
+    #[test]
+    fn cells_that_tell_nothing_leave_the_share_to_others() {
+        let nothing = clouds::prior_clear();
+        let mut cells = vec![cell(nothing); 60];
+        cells.extend([cell(0.99); 30]);
+        cells.extend([cell(0.02); 10]);
+        let share = cloud_share(&cells).unwrap();
+        assert!((share.value - 0.25).abs() < 0.03, "{share:?}");
+        assert!((0.04..0.2).contains(&share.sigma), "{share:?}");
+        assert_eq!(cloud_share(&[]), None);
+    }
 }

@@ -45,6 +45,16 @@ impl RelativeLimit {
         completeness::measure(&counted, chance).limit.ok().map(Self)
     }
 
+    /// That of most frames: half of the stars at the threshold are above it by their noise.
+    pub(super) fn usual() -> Self {
+        Self(Limit {
+            v_mag: 0.0,
+            sigma_mag: 0.1,
+            width_mag: 0.25,
+            lost: 0.02,
+        })
+    }
+
     /// The probability that a star is detected.
     pub(super) fn probability(&self, relative_mag: f64) -> f64 {
         let Self(limit) = self;

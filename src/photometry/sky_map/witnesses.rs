@@ -25,6 +25,8 @@ pub(super) struct Sky<'a> {
     pub exposure_s: f64,
     /// Probability that a star has a detection by chance.
     pub chance: f64,
+    /// Whether the clear sky is that of another frame.
+    pub is_usual: bool,
 }
 
 /// A star as a witness of clouds.

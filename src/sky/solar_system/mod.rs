@@ -77,6 +77,15 @@ pub fn bodies_within(
         .collect()
 }
 
+/// The Moon as seen from `site` at `date`, and the Sun's astrometric direction from the Earth's centre, to
+/// some 2′. In microseconds.
+#[doc(hidden)]
+pub fn moon_and_sun(date: &ObservationDate, site: Option<Site>) -> (Body, UnitVector<Icrs>) {
+    let time = Time::new(date, TimeError::None, site);
+    let sun = UnitVector::from_vector(-time.moment.earth_au);
+    (time.body(BodyKind::Moon), sun)
+}
+
 /// A time, and those as far from it as the true one may be.
 struct Time {
     moment: Moment,

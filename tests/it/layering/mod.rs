@@ -69,6 +69,20 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
+    (
+        "night",
+        &[
+            "base",
+            "sky",
+            "frame",
+            "camera",
+            "identify",
+            "photometry",
+            "pipeline",
+            "lens",
+            "report",
+        ],
+    ),
     ("archive", &["base", "sky", "pipeline", "report"]),
     (
         "study",

@@ -1,0 +1,124 @@
+//! The arguments of `night`.
+
+use super::files;
+use crate::cli::exit::CommandError;
+use crate::cli::options::catalog::CatalogOptions;
+use crate::cli::options::format::PageFormat;
+use crate::cli::options::frames::MemoryOption;
+use crate::cli::options::hints::HintOptions;
+use crate::cli::options::values;
+use crate::cli::process::CalibrationOptions;
+use crate::cli::solving::Plan;
+use clap::Args;
+use jiff::SignedDuration;
+use starpipe::calibration::Calibration;
+use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    starpipe night --site 52.22,4.42 --dark master-dark.fits --out 2026-01-15 night/\n  \
+    starpipe night --site 47.1,8.3,900 --camera camera.toml --utc-offset 1 --out results 'night/image-*.tif'\n\n\
+    The frames are taken in the order of their dates. Some that are spread over the night tell the lens and how\n\
+    the camera stands; both are then held. --out has a line for each frame in night.jsonl, the same as\n\
+    night.csv, night.parquet and night.dat (the zenith in the skyglow community's format), and the night in\n\
+    night.json and night.svg; hot-pixels.csv lists what stays as the sky moves. The same command goes on where it was stopped.\n\n\
+    Exit status: 0 all went well, 1 something could not be read or written, 2 the command line is wrong, 3 no\n\
+    frame was identified.")]
+pub(crate) struct NightArgs {
+    /// Frames of a night; a directory stands for the frames in it, a pattern ('night/*.fits') for those
+    /// that match, a list (.txt, .lst, .parquet, or - for standard input) for those that it names
+    #[arg(value_name = "FRAME", required = true)]
+    pub(super) frames: Vec<PathBuf>,
+    /// Directory for the results
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Also write night.html: the figure, what changed, and the table, to look at in a browser
+    #[arg(long)]
+    pub(super) html: bool,
+    /// How many hours the dates in the files' names are ahead of UTC: 0 if they are UTC. Dates in headers
+    /// are UTC [default: not known, and such dates tell no place in the sky of a site]
+    #[arg(long, value_name = "HOURS", value_parser = values::finite, allow_hyphen_values = true)]
+    pub(super) utc_offset: Option<f64>,
+    /// What to print when the night is done
+    #[arg(long, value_enum, default_value_t = PageFormat::Text)]
+    pub(super) format: PageFormat,
+    /// Print errors only
+    #[arg(short, long, conflicts_with = "format")]
+    pub(super) quiet: bool,
+    /// Leave out the hot pixels that the sky's motion tells, which hot-pixels.csv lists
+    #[arg(long, conflicts_with = "hot_pixels")]
+    pub(super) mask_hot_pixels: bool,
+    #[command(flatten)]
+    pub(super) calibration: CalibrationOptions,
+    /// Exposure of the frames, in seconds [default: the exposure in the file's header]
+    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true,
+          help_heading = "What is known of the frames")]
+    exposure: Option<f64>,
+    #[command(flatten)]
+    pub(super) hints: HintOptions,
+    #[command(flatten)]
+    pub(super) station: StationOptions,
+    /// Time limit for a frame, in seconds; a frame that exceeds it counts as not identified
+    #[arg(long = "time-limit", value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true,
+          default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
+    time_limit_s: f64,
+    #[command(flatten)]
+    memory: MemoryOption,
+    #[command(flatten)]
+    pub(super) catalog: CatalogOptions,
+}
+
+/// What night.dat says of the station.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Header of night.dat")]
+pub(super) struct StationOptions {
+    /// Name of the instrument
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub(super) instrument: String,
+    /// Who supplies the data
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub(super) supplier: String,
+    /// Name of the place
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    pub(super) location: String,
+}
+
+impl NightArgs {
+    /// What the dates in the names are ahead of UTC.
+    pub(super) fn names_ahead_of_utc(&self) -> Option<SignedDuration> {
+        const S_PER_HOUR: f64 = 3600.0;
+        self.utc_offset
+            .map(|hours| SignedDuration::from_secs((hours * S_PER_HOUR).round() as i64))
+    }
+
+    /// The calibration with the hot pixels that were learned.
+    pub(super) fn masked_calibration(&self) -> anyhow::Result<Option<Calibration>> {
+        let learned = CalibrationOptions {
+            hot_pixels: Some(self.out.join(files::HOT_PIXELS)),
+            ..self.calibration.clone()
+        };
+        learned.read(self.hints.description()?.as_ref())
+    }
+
+    /// What the frames are solved with.
+    pub(super) fn plan(&self) -> Result<Plan, CommandError> {
+        if self.hints.date.is_some() {
+            return Err(CommandError::usage(
+                "--date is one date for all frames; those of a night have their own, in their headers or in \
+                 their names with --utc-offset",
+            ));
+        }
+        let camera = self.hints.description()?;
+        let mut options: SolveOptions = self.hints.options()?;
+        options.sky = true;
+        options.exposure_s = self.exposure;
+        options.time_limit_s = Some(self.time_limit_s);
+        Ok(Plan {
+            options,
+            calibration: self.calibration.read(camera.as_ref())?,
+            camera,
+            memory: self.memory.limit(),
+        })
+    }
+}

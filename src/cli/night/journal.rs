@@ -1,0 +1,95 @@
+//! The rows of a night, written as they are made: a run that was stopped goes on with them.
+
+use crate::cli::output::rows::json_line;
+use anyhow::{Context, bail};
+use starpipe::night::NightRow;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// The file of rows.
+pub(super) struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// Opens the file of a run over `frames`, and returns it with the rows of the batches of `batch` frames
+    /// that are complete in it. The rest is cut off.
+    pub(super) fn open(
+        path: &Path,
+        frames: &[String],
+        batch: usize,
+    ) -> anyhow::Result<(Self, Vec<NightRow>)> {
+        let text = match fs::read(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            read => read.with_context(|| format!("reading {}", path.display()))?,
+        };
+        let lines = text.split_inclusive(|byte| *byte == b'\n');
+        let lines: Vec<&[u8]> = lines.filter(|line| line.ends_with(b"\n")).collect();
+        let whole = if lines.len() < frames.len() {
+            lines.len() / batch * batch
+        } else {
+            lines.len()
+        };
+        let mut rows = Vec::with_capacity(whole);
+        for (number, line) in lines[..whole].iter().enumerate() {
+            let row: NightRow = serde_json::from_slice(line)
+                .with_context(|| format!("reading {}, line {}", path.display(), number + 1))?;
+            if frames.get(number) != Some(&row.frame) {
+                bail!(
+                    "{}, line {}: found frame {:?}, expected {:?}",
+                    path.display(),
+                    number + 1,
+                    row.frame,
+                    frames.get(number).map_or("no more", String::as_str)
+                );
+            }
+            rows.push(row);
+        }
+        let bytes: usize = lines[..whole].iter().map(|line| line.len()).sum();
+        let open = || {
+            let file = File::options().create(true).append(true).open(path)?;
+            file.set_len(bytes as u64)?;
+            std::io::Result::Ok(file)
+        };
+        let file = open().with_context(|| format!("writing {}", path.display()))?;
+        let path = path.to_owned();
+        Ok((Self { path, file }, rows))
+    }
+
+    /// Adds the rows of a batch.
+    pub(super) fn add(&mut self, rows: &[NightRow]) -> anyhow::Result<()> {
+        let text: String = rows.iter().map(json_line).collect::<anyhow::Result<_>>()?;
+        let written = self.file.write_all(text.as_bytes());
+        let written = written.and_then(|()| self.file.sync_data());
+        written.with_context(|| format!("writing {}", self.path.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn complete_batches_are_kept_and_the_rest_is_cut_off() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("night.jsonl");
+        let names: Vec<String> = (0..7).map(|n| format!("{n}.fits")).collect();
+        let rows: Vec<NightRow> = names.iter().map(|name| NightRow::unread(name)).collect();
+        let (mut journal, none) = Journal::open(&path, &names, 2).unwrap();
+        assert!(none.is_empty());
+        journal.add(&rows[..5]).unwrap();
+        fs::write(
+            &path,
+            [&fs::read(&path).unwrap()[..], b"{\"frame\":"].concat(),
+        )
+        .unwrap();
+        let (mut journal, kept) = Journal::open(&path, &names, 2).unwrap();
+        assert_eq!(kept, rows[..4]);
+        journal.add(&rows[4..]).unwrap();
+        let (_, all) = Journal::open(&path, &names, 2).unwrap();
+        assert_eq!(all, rows);
+        assert!(Journal::open(&path, &names[1..], 2).is_err());
+    }
+}

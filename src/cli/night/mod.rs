@@ -1,0 +1,165 @@
+//! `night`: a night of one camera on its mount.
+
+mod args;
+mod files;
+mod hot;
+mod journal;
+mod order;
+mod page;
+mod run;
+mod text;
+
+pub(crate) use args::NightArgs;
+
+use super::exit::{CommandError, Exit, Outcome};
+use super::input::names::frame_names;
+use super::options::format::PageFormat;
+use super::output::files::{make_directory, write_whole};
+use super::output::rows::json_line;
+use super::process::hash_of;
+use super::solving::Plan;
+use journal::Journal;
+use run::{BATCH, Measured, Run};
+use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
+use starpipe::lens::MEASURED_BY;
+use starpipe::night::{SkyglowStation, summarize};
+use starpipe::sky::catalog::Catalog;
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+/// `starpipe night`
+pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
+    let plan = arguments.plan()?;
+    let names = frame_names(&arguments.frames)?;
+    arguments.catalog.with_index(|pool, indexed| {
+        let names = order::by_date(names, pool, plan.memory);
+        claim(arguments, &plan, &names, indexed.catalog())?;
+        let (journal, rows) = Journal::open(&arguments.out.join(files::ROWS), &names, BATCH)?;
+        let mut context = plan.context(indexed);
+        context.names_ahead_of_utc = arguments.names_ahead_of_utc();
+        let run = Run {
+            pool,
+            plan: &plan,
+            context,
+            is_quiet: arguments.quiet,
+        };
+        let start = run.start(&names);
+        let hot = hot::learn(&run, &names, &start);
+        if let Some(pixels) = &hot {
+            let list = (
+                arguments.out.join(files::HOT_PIXELS),
+                hot::table(pixels)?.into_bytes(),
+            );
+            write_whole(&[list])?;
+        }
+        let masked = match &hot {
+            Some(pixels) if arguments.mask_hot_pixels && !pixels.is_empty() => {
+                arguments.masked_calibration()?
+            }
+            _ => None,
+        };
+        let run = run.with_calibration(masked.as_ref());
+        let measured = run.measure(&names, start, journal, rows)?;
+        finish(arguments, &measured, hot.map(|pixels| pixels.len()))
+    })
+}
+
+/// Takes the directory for this run, or goes on in it.
+fn claim(
+    arguments: &NightArgs,
+    plan: &Plan,
+    names: &[String],
+    catalog: &Catalog,
+) -> Result<(), CommandError> {
+    let directory = &arguments.out;
+    make_directory(directory)?;
+    let is_foreign =
+        |name: &&&str| directory.join(name).exists() && !directory.join(files::RUN).exists();
+    if let Some(name) = files::NAMES.iter().find(is_foreign) {
+        return Err(CommandError::usage(format_args!(
+            "{} has {name} and no {}: it is not of a night; choose another directory for --out",
+            directory.display(),
+            files::RUN
+        )));
+    }
+    let frames = archive::Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
+    let identity = Identity::new(&frames, &configuration(arguments, plan, catalog)?)?;
+    archive::claim_file(directory, files::RUN, &identity).map_err(|error| match error {
+        ArchiveError::OtherRun { .. } => {
+            CommandError::usage(format_args!("{error}; choose another directory for --out"))
+        }
+        other => other.into(),
+    })
+}
+
+/// All that the rows depend on.
+fn configuration(
+    arguments: &NightArgs,
+    plan: &Plan,
+    catalog: &Catalog,
+) -> anyhow::Result<Configuration> {
+    let calibration = &arguments.calibration;
+    Ok(Configuration {
+        catalog: catalog.into(),
+        options: plan.options.clone(),
+        camera: hash_of(&arguments.hints.camera)?,
+        dark: hash_of(&calibration.dark)?,
+        flat: hash_of(&calibration.flat)?,
+        hot_pixels: hash_of(&calibration.hot_pixels)?,
+        mask: hash_of(&calibration.mask)?,
+        page: None,
+        night: Some(NightConfiguration {
+            utc_offset_h: arguments.utc_offset,
+            mask_hot_pixels: arguments.mask_hot_pixels,
+        }),
+    })
+}
+
+/// Writes the files of a night, and says what it was.
+fn finish(
+    arguments: &NightArgs,
+    measured: &Measured,
+    hot_pixels: Option<usize>,
+) -> Result<Outcome, CommandError> {
+    let Measured {
+        rows,
+        history,
+        start,
+    } = measured;
+    let mut night = summarize(rows, start.site, history.knocks());
+    night.hot_pixels = hot_pixels;
+    let station = SkyglowStation {
+        instrument: arguments.station.instrument.clone(),
+        supplier: arguments.station.supplier.clone(),
+        location: arguments.station.location.clone(),
+        site: start.site,
+    };
+    let about = || {
+        vec![format!(
+            "{MEASURED_BY} {} in frames of a night",
+            env!("CARGO_PKG_VERSION")
+        )]
+    };
+    let lens = start.lens.as_ref().map(|lens| lens.to_toml(&about()));
+    let directory: &Path = &arguments.out;
+    let mut results = files::of_rows(directory, rows, &night, &station)?;
+    results.extend(lens.map(|lens| (directory.join(files::LENS), lens.into_bytes())));
+    if arguments.html {
+        let page = page::of(rows, &night, &files::csv(rows)?)?;
+        results.push(super::page::file(&directory.join(files::PAGE), &page)?);
+    }
+    write_whole(&results)?;
+    let exit = if night.unread > 0 {
+        Exit::Failure
+    } else if night.identified == 0 {
+        Exit::NotIdentified
+    } else {
+        Exit::Success
+    };
+    let text = match arguments.format {
+        _ if arguments.quiet => String::new(),
+        PageFormat::Text => text::text(&night),
+        PageFormat::Json => json_line(&night)?,
+    };
+    Ok(Outcome { text, exit })
+}

@@ -1,0 +1,77 @@
+//! The page of a night.
+
+use super::text;
+use crate::cli::output::rows::csv_table;
+use crate::cli::page::{options, table};
+use starpipe::night::{self, Moment, NightRow, NightSummary};
+use starpipe::report::page::{Fact, Page, PageFigure};
+
+/// The page of the frames of a night; `csv` is their table.
+pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow::Result<Page> {
+    let figure = night::svg(rows, summary).map(|svg| PageFigure {
+        caption: "The night: a frame's values are shown where the pointer is".to_owned(),
+        svg,
+        is_wide: true,
+        is_colored: true,
+    });
+    let mut tables = Vec::new();
+    if !summary.moments.is_empty() {
+        let moments = summary.moments.iter().map(MomentLine::of);
+        tables.push(table("What changed", &csv_table(moments)?)?);
+    }
+    tables.push(table("Frames", csv)?);
+    Ok(Page {
+        title: format!("Night of {}", summary.first_date),
+        question: "How was the night?".to_owned(),
+        answer: format!(
+            "{:.1} of {:.1} hours were clear.",
+            summary.clear_hours, summary.hours
+        ),
+        facts: facts(summary),
+        text: text::text(summary),
+        figures: figure.into_iter().collect(),
+        tables,
+        provenance: vec![options()],
+        ..Page::default()
+    })
+}
+
+fn facts(summary: &NightSummary) -> Vec<Fact> {
+    let median = &summary.median;
+    let values = [
+        ("Zenith", median.zenith_mag_arcsec2, "mag/arcsec²"),
+        ("Half of the stars are found at V", median.limit_vmag, ""),
+        (
+            "Measured minus predicted",
+            median.limit_difference_mag,
+            "mag",
+        ),
+        (
+            "Extinction",
+            median.extinction_mag_per_airmass,
+            "mag per airmass",
+        ),
+    ];
+    let fact = |(name, value, unit): (&str, Option<f64>, &str)| {
+        Some(Fact::new(name, format!("{:.2} {unit}", value?)))
+    };
+    values.into_iter().filter_map(fact).collect()
+}
+
+/// A moment as a line of a table.
+#[derive(serde::Serialize)]
+struct MomentLine<'a> {
+    date: &'a str,
+    frame: usize,
+    what: String,
+}
+
+impl<'a> MomentLine<'a> {
+    fn of(moment: &'a Moment) -> Self {
+        Self {
+            date: &moment.date,
+            frame: moment.frame,
+            what: moment.to_text(),
+        }
+    }
+}

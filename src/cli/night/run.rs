@@ -1,0 +1,186 @@
+//! The frames of a night, batch by batch.
+
+use super::journal::Journal;
+use crate::cli::exit::CommandError;
+use crate::cli::output::messages::report_error;
+use crate::cli::progress::frames_bar;
+use crate::cli::solving::{Inputs, Plan, Sink, Solved, Solver};
+use indicatif::ProgressBar;
+use starpipe::calibration::Calibration;
+use starpipe::frame::{ImageName, PageChoice};
+use starpipe::night::{NightRow, NightStart, PointingHistory, Probe, probe_order};
+use starpipe::pipeline::{Context, HeldCamera};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Frames that are solved with the same pointing, whatever the number of threads.
+pub(super) const BATCH: usize = 8;
+
+/// What a night is measured with.
+pub(super) struct Run<'a> {
+    pub(super) pool: &'a rayon::ThreadPool,
+    pub(super) plan: &'a Plan,
+    pub(super) context: Context<'a>,
+    pub(super) is_quiet: bool,
+}
+
+/// The rows of a night, and what was held.
+pub(super) struct Measured {
+    pub(super) rows: Vec<NightRow>,
+    pub(super) history: PointingHistory,
+    pub(super) start: NightStart,
+}
+
+impl<'a> Run<'a> {
+    /// The same with another calibration, if there is one.
+    pub(super) fn with_calibration(self, calibration: Option<&'a Calibration>) -> Self {
+        let mut context = self.context;
+        context.calibration = calibration.or(context.calibration);
+        Self { context, ..self }
+    }
+
+    /// Measures the frames `names`, in their order, going on after the rows in `journal`.
+    pub(super) fn measure(
+        &self,
+        names: &[String],
+        start: NightStart,
+        mut journal: Journal,
+        rows: Vec<NightRow>,
+    ) -> Result<Measured, CommandError> {
+        let progress = self.bar(names.len());
+        let mut measured = Measured {
+            history: PointingHistory::new(start.held.as_ref().map(|held| held.pointing)),
+            rows: Vec::with_capacity(names.len()),
+            start,
+        };
+        for row in rows {
+            measured.take(row);
+        }
+        progress.inc(measured.rows.len() as u64);
+        while measured.rows.len() < names.len() {
+            let done = measured.rows.len();
+            let batch = &names[done..(done + BATCH).min(names.len())];
+            for row in self.batch(batch, &measured, &progress) {
+                measured.take(row);
+            }
+            journal.add(&measured.rows[done..])?;
+        }
+        progress.finish_and_clear();
+        Ok(measured)
+    }
+
+    fn bar(&self, frames: usize) -> ProgressBar {
+        if self.is_quiet {
+            ProgressBar::hidden()
+        } else {
+            frames_bar(frames as u64)
+        }
+    }
+
+    /// What frames all over the night tell.
+    pub(super) fn start(&self, names: &[String]) -> NightStart {
+        let order = probe_order(names.len());
+        let mut probes = Vec::new();
+        let mut tried = 0;
+        for batch in order.chunks(BATCH) {
+            let paths: Vec<&String> = batch.iter().map(|at| &names[*at]).collect();
+            let solver = self.solver(self.context.clone(), Probes);
+            solver.solve_all(&paths, |images| {
+                // Frames that cannot be read are reported with their rows.
+                let found = images
+                    .into_iter()
+                    .filter_map(|(_, probe)| probe.ok().flatten());
+                probes.extend(found);
+                ControlFlow::Continue(())
+            });
+            tried += batch.len();
+            if NightStart::is_enough(probes.len(), tried) {
+                break;
+            }
+        }
+        NightStart::of(probes, self.context.lens.clone())
+    }
+
+    /// The rows of a batch.
+    fn batch(
+        &self,
+        names: &[String],
+        measured: &Measured,
+        progress: &ProgressBar,
+    ) -> Vec<NightRow> {
+        let mut context = self.context.clone();
+        context.lens = measured.start.lens.clone();
+        context.held = measured.held().map(Arc::new);
+        let rows = Rows {
+            clear_ground_vmag: measured.start.clear_ground_vmag,
+        };
+        let mut all = Vec::with_capacity(names.len());
+        self.solver(context, rows).solve_all(names, |images| {
+            progress.inc(1);
+            for (name, row) in images {
+                all.push(row.unwrap_or_else(|error| {
+                    progress.suspend(|| report_error(error.as_ref()));
+                    NightRow::unread(&name)
+                }));
+            }
+            ControlFlow::Continue(())
+        });
+        all
+    }
+
+    fn solver<'s, S>(&'s self, context: Context<'s>, sink: S) -> Solver<'s, S> {
+        const MAIN: &Inputs = &Inputs::Frames(PageChoice::Main);
+        Solver {
+            pool: self.pool,
+            inputs: MAIN,
+            context,
+            memory: self.plan.memory,
+            sink,
+        }
+    }
+}
+
+impl Measured {
+    /// Takes the next row, and says by how much the camera differs from how it is held.
+    fn take(&mut self, mut row: NightRow) {
+        if let Some(shift_rad) = self.history.take_row(self.rows.len(), &row) {
+            row.set_shift(shift_rad);
+        }
+        self.rows.push(row);
+    }
+
+    /// The camera as it is held now.
+    fn held(&self) -> Option<HeldCamera> {
+        let held = self.start.held.clone()?;
+        let (pointing, sigma_rad) = self.history.held()?;
+        Some(HeldCamera {
+            pointing,
+            sigma_rad,
+            ..held
+        })
+    }
+}
+
+/// Makes of a frame what it tells of the start.
+struct Probes;
+
+impl Sink for Probes {
+    type Made = Option<Probe>;
+
+    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
+        Probe::of(&image.to_string(), &solved.solution)
+    }
+}
+
+/// Makes of a frame its row.
+struct Rows {
+    clear_ground_vmag: Option<f64>,
+}
+
+impl Sink for Rows {
+    type Made = NightRow;
+
+    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
+        NightRow::of(&image.to_string(), &solved.solution, self.clear_ground_vmag)
+    }
+}

@@ -1,0 +1,38 @@
+//! What does a night show? One camera on its mount, frame by frame.
+//!
+//! solved frames of a night, in the order of their dates → [`NightRow`] for each → [`NightSummary`]
+//!
+//! 1. Frames spread over the night are solved with nothing known. They tell the lens, how the camera stands
+//!    in the sky of its site, and the air without clouds ([`NightStart`]).
+//! 2. Each frame is solved from where the camera is held. Its sky is measured, also where its stars are not
+//!    identified: by the attitude that the mount and the date give ([`NightRow`]).
+//! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
+//!    frames that agree with each other ([`PointingHistory`]).
+//! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels`]).
+//! 5. The series tell when something changes ([`Moment`]).
+//!
+//! Caveats: a camera that follows the stars has no pointing in the horizon to hold; its frames are solved
+//! one by one.
+
+mod almanac;
+mod cells;
+mod departure;
+mod figure;
+mod hot_pixels;
+mod moments;
+mod pointing;
+mod row;
+mod skyglow;
+mod start;
+mod summary;
+
+pub use almanac::Almanac;
+pub use cells::NightCells;
+pub use figure::svg;
+pub use hot_pixels::{NightHotPixel, Standouts, hot_pixels};
+pub use moments::{Moment, MomentKind};
+pub use pointing::{Knock, PointingHistory};
+pub use row::NightRow;
+pub use skyglow::{SkyglowStation, skyglow};
+pub use start::{NightStart, Probe, probe_order};
+pub use summary::{NightSummary, summarize};

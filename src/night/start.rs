@@ -1,0 +1,137 @@
+//! What the first frames tell of a camera and its night.
+
+use crate::base::coords::{Camera, Horizon, Rotation};
+use crate::camera::KnownLens;
+use crate::identify::Identification;
+use crate::lens::{LensFrame, calibrate};
+use crate::photometry::sky_map::ClearSky;
+use crate::pipeline::{HeldCamera, Outcome, Solution};
+use crate::sky::observer::Site;
+use std::sync::Arc;
+
+/// Frames that tell the lens at least, where so many are identified.
+const WANTED: usize = 5;
+/// Frames that are tried at most.
+const MAX_TRIED: usize = 40;
+
+/// A frame that was identified with nothing known beforehand.
+#[derive(Debug, Clone)]
+pub struct Probe {
+    stars: LensFrame,
+    camera: KnownLens,
+    /// Modified Julian Date.
+    mjd: Option<f64>,
+    pointing: Option<Rotation<Horizon, Camera>>,
+    sigma_rad: f64,
+    clear_sky: Option<ClearSky>,
+    site: Option<Site>,
+}
+
+impl Probe {
+    /// That of a solved frame; `None` if its stars are not identified.
+    pub fn of(name: &str, solution: &Solution) -> Option<Self> {
+        let Outcome::Identified(found) = &solution.outcome else {
+            return None;
+        };
+        let date = solution.date.map(|known| known.date);
+        Some(Self {
+            stars: LensFrame::new(name, solution).ok()?,
+            camera: KnownLens::with_assumed_errors(found.camera)?,
+            mjd: date.and_then(|date| date.modified_julian_date()),
+            pointing: horizon_attitude(found),
+            sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
+            clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
+            site: solution.site,
+        })
+    }
+}
+
+/// How an identified camera stands in the sky of its site: apparent directions in the axes of the horizon
+/// to camera axes. `None` where site or time are not known.
+pub(super) fn horizon_attitude(found: &Identification) -> Option<Rotation<Horizon, Camera>> {
+    let horizon = found.places.horizon()?;
+    let matrix = found.icrs_to_camera.matrix() * horizon.matrix().transpose();
+    Some(Rotation::from_matrix(matrix))
+}
+
+/// What is held from the start of a night.
+#[derive(Debug, Clone, Default)]
+pub struct NightStart {
+    /// The lens.
+    pub lens: Option<Arc<KnownLens>>,
+    /// How the camera stands, and its clear sky.
+    pub held: Option<HeldCamera>,
+    /// Zero point through one airmass in the clearest of the frames, in V.
+    pub clear_ground_vmag: Option<f64>,
+    /// Where it is.
+    pub site: Option<Site>,
+}
+
+impl NightStart {
+    /// What `probes` tell; `known` is the lens that was measured before.
+    pub fn of(probes: Vec<Probe>, known: Option<Arc<KnownLens>>) -> Self {
+        let skies = probes.iter().filter_map(|probe| probe.clear_sky);
+        let clear_sky = skies.max_by(|a, b| a.ground_vmag().total_cmp(&b.ground_vmag()));
+        let first = probes
+            .iter()
+            .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let site = probes.iter().find_map(|probe| probe.site);
+        let lens = known.or_else(|| measured_lens(probes));
+        let held = first
+            .zip(lens.as_ref())
+            .map(|((_, pointing, sigma_rad), lens)| HeldCamera {
+                camera: *lens.camera(),
+                pointing,
+                sigma_rad,
+                clear_sky,
+            });
+        Self {
+            lens,
+            held,
+            clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
+            site,
+        }
+    }
+
+    /// Whether so many frames tell enough, of `tried` ones.
+    pub fn is_enough(identified: usize, tried: usize) -> bool {
+        identified >= WANTED || tried >= MAX_TRIED
+    }
+}
+
+/// The lens that the frames show together, else that of the one with the most stars.
+fn measured_lens(probes: Vec<Probe>) -> Option<Arc<KnownLens>> {
+    let most = probes.iter().max_by_key(|probe| probe.stars.stars());
+    let own = most.map(|probe| probe.camera.clone());
+    let frames = probes.into_iter().map(|probe| probe.stars).collect();
+    let together = calibrate(frames, Vec::new()).ok().map(|found| found.lens);
+    together.or(own).map(Arc::new)
+}
+
+/// The order in which the frames of a night are tried: the first, then halves, quarters and so on of the
+/// night, so that any number of them is spread over it.
+pub fn probe_order(frames: usize) -> Vec<usize> {
+    let bits = frames.max(2).next_power_of_two().trailing_zeros();
+    let reversed = |at: usize| at.reverse_bits() >> (usize::BITS - bits);
+    (0..1_usize << bits)
+        .map(reversed)
+        .filter(|at| *at < frames)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_tried_all_over_the_night_and_each_once() {
+        assert_eq!(probe_order(8), [0, 4, 2, 6, 1, 5, 3, 7]);
+        let mut all = probe_order(100);
+        assert!(all[..8].iter().any(|at| *at > 80));
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..100));
+        assert_eq!(probe_order(1), [0]);
+        assert!(probe_order(0).is_empty());
+    }
+}
