@@ -11,7 +11,8 @@ use crate::photometry::comparison::ObservingSetup;
 use crate::sky::places::AttitudeFrame;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use web_time::Instant;
 
 /// How long a frame may take by default where many are solved, in seconds.
 pub const DEFAULT_TIME_LIMIT_S: f64 = 60.0;

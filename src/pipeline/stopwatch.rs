@@ -1,6 +1,7 @@
 //! Times the stages.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use web_time::Instant;
 
 /// Time that each stage took, in milliseconds; 0 for a stage that was not needed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
