@@ -1,5 +1,6 @@
 //! What the stages need and what does not change from frame to frame.
 
+use super::stopwatch::Stage;
 use crate::base::epoch::ObservationDate;
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
@@ -50,6 +51,9 @@ pub struct Context<'a> {
     pub as_stored: bool,
     /// How long a frame may take, from where its reading begins.
     pub time_limit: Option<Duration>,
+    /// Told of each stage that is done; a stage may come again.
+    #[doc(hidden)]
+    pub on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
 impl<'a> Context<'a> {
@@ -69,6 +73,7 @@ impl<'a> Context<'a> {
             effort: Effort::Normal,
             as_stored: false,
             time_limit: None,
+            on_stage: None,
         }
     }
 

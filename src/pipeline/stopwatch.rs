@@ -1,5 +1,6 @@
 //! Times the stages.
 
+use serde::Serialize;
 use std::time::Duration;
 use web_time::Instant;
 
@@ -24,31 +25,41 @@ pub struct Timing {
 }
 
 /// A stage that is timed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Stage {
+    /// Reading, decoding and calibrating.
     Read,
+    /// Detecting and measuring the sources.
     Detect,
+    /// Finding out where the camera points.
     Pointing,
+    /// Finding out which star is which.
     Naming,
+    /// What follows from the names.
     Identify,
+    /// Photometry, and comparison with the stated camera.
     Photometry,
 }
 
 /// Times one frame from stage to stage.
-#[derive(Debug)]
-pub(super) struct Stopwatch {
+pub(super) struct Stopwatch<'a> {
     start: Instant,
     lap_start: Instant,
     timing: Timing,
+    on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
-impl Stopwatch {
-    pub(super) fn start() -> Self {
+impl<'a> Stopwatch<'a> {
+    /// Starts, and tells `on_stage` of each stage that is done.
+    pub(super) fn start(on_stage: Option<&'a (dyn Fn(Stage) + Sync)>) -> Self {
         let now = Instant::now();
         Self {
             start: now,
             lap_start: now,
             timing: Timing::default(),
+            on_stage,
         }
     }
 
@@ -73,6 +84,9 @@ impl Stopwatch {
         }
         if matches!(stage, Stage::Pointing | Stage::Naming | Stage::Identify) {
             self.timing.identify_ms += lap_ms;
+        }
+        if let Some(on_stage) = self.on_stage {
+            on_stage(stage);
         }
     }
 

@@ -1,6 +1,7 @@
-  const data = JSON.parse(document.getElementById("data").textContent);
+// Brings the elements of a frame in `root` to life: picture, figures and table.
+const showFrame = (root, data) => {
   const NS = "http://www.w3.org/2000/svg";
-  const byId = (id) => document.getElementById(id);
+  const byId = (id) => root.querySelector(`#${id}`);
   const make = (parent, tag, attributes = {}, text) => {
     const node = document.createElementNS(NS, tag);
     for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
@@ -24,6 +25,13 @@
   // The picture: the view box is what is seen of the frame, in its pixels.
   const view = byId("view");
   const layers = {};
+  for (const { key, lines, circles, texts } of data.sky) {
+    const layer = layers[key] = make(view, "g", { class: `sky ${key}` });
+    for (const line of lines) make(layer, "path", { d: `M${line.map((at) => at.join(" ")).join("L")}` });
+    for (const [cx, cy, r] of circles) make(layer, "circle", { cx, cy, r });
+    for (const [text, [x, y]] of texts) make(layer, "text", { x, y }, text);
+  }
+  const skyTexts = view.querySelectorAll(".sky text");
   for (const name of ["other", "unidentified", "identified", "residuals", "names"]) layers[name] = make(view, "g");
   const box = { x: -0.5, y: -0.5, w: width, h: height };
   // Pixels of the frame in one of the screen.
@@ -60,6 +68,7 @@
         star.arrow.setAttribute("d", `M${x} ${y}L${ex} ${ey}l${(-star.dx - star.dy * 0.6) * b} ${(-star.dy + star.dx * 0.6) * b}M${ex} ${ey}l${(-star.dx + star.dy * 0.6) * b} ${(-star.dy - star.dx * 0.6) * b}`);
       }
     }
+    for (const node of skyTexts) { node.setAttribute("font-size", 12 * u); node.setAttribute("stroke-width", 3 * u); }
     placeNames(u);
   };
   // The brightest stars in view, where there is room.
@@ -129,11 +138,11 @@
     };
     if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
   });
-  for (const button of document.querySelectorAll("[data-zoom]")) {
+  for (const button of root.querySelectorAll("[data-zoom]")) {
     const factor = Number(button.dataset.zoom);
     button.addEventListener("click", () => (factor ? zoom(factor) : whole()));
   }
-  for (const input of document.querySelectorAll("[data-layer]")) {
+  for (const input of root.querySelectorAll("[data-layer]")) {
     const layer = layers[input.dataset.layer] || byId("picture");
     if (input.dataset.layer === "unidentified" && !stars.some((star) => star.id)) input.checked = true;
     const apply = () => { if (layer) layer.style.display = input.checked ? "" : "none"; };
@@ -174,7 +183,7 @@
   // The table, with the marks in the picture of what is left in it.
   const text = (key) => (s) => s[key] || "";
   const column = (key, title, shown, isText = false) => ({ key, title, isText, text: shown, value: (s) => s[key] });
-  const table = makeTable(document.querySelector("section.table"), [
+  const table = makeTable(root.querySelector("section.table"), [
     column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true), column("hd", "HD", text("hd")),
     column("v", "V", (s) => number(s.v, 2)), column("snr", "SNR", (s) => s.snr ?? ""), column("flux", "Flux", (s) => s.flux ?? ""),
     column("x", "x", (s) => number(s.x, 2)), column("y", "y", (s) => number(s.y, 2)),
@@ -267,3 +276,4 @@
 
   show();
   new ResizeObserver(show).observe(view);
+};
