@@ -5,8 +5,9 @@
 
 use super::data::PageData;
 use super::template::{Kind, picture_address, render, render_view};
+use crate::frame::Frame;
 use crate::pipeline::Solution;
-use crate::report::overlay::{OverlayOptions, Shown, photograph};
+use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
 use crate::report::{FrameReport, TextOptions};
 use minijinja::context;
 use minijinja::value::{Serde, Value};
@@ -66,6 +67,15 @@ pub fn view(
         html: render_view(&FRAME, values)?,
         data: serde_json::to_string(&data)?,
     })
+}
+
+/// A frame in grey, as JPEG of at most `most_px` columns, to look at before it is solved.
+///
+/// # Errors
+/// As [`html`].
+#[doc(hidden)]
+pub fn preview(frame: &Frame<'_>, most_px: usize) -> io::Result<Vec<u8>> {
+    jpeg(&thumbnail(frame, most_px))
 }
 
 fn picture(shown: &Shown<'_>, solution: &Solution, options: &OverlayOptions) -> io::Result<String> {

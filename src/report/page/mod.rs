@@ -22,7 +22,7 @@ mod template;
 pub use document::{Fact, Page, PageFigure, Thumbnail};
 pub use frame::html;
 #[doc(hidden)]
-pub use frame::{FrameView, view};
+pub use frame::{FrameView, preview, view};
 #[doc(hidden)]
 pub use table::PageTable;
 
