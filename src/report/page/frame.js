@@ -1,14 +1,6 @@
 // Brings the elements of a frame in `root` to life: picture, figures and table.
 const showFrame = (root, data) => {
-  const NS = "http://www.w3.org/2000/svg";
   const byId = (id) => root.querySelector(`#${id}`);
-  const make = (parent, tag, attributes = {}, text) => {
-    const node = document.createElementNS(NS, tag);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.appendChild(node);
-    return node;
-  };
   const { width, height } = data;
   const columns = Object.entries(data.stars);
   const stars = data.stars.x.map((_, row) => {
@@ -96,6 +88,7 @@ const showFrame = (root, data) => {
       frame = 0;
       view.setAttribute("viewBox", `${box.x} ${box.y} ${box.w} ${box.h}`);
       view.classList.toggle("sharp", unit() < 0.34);
+      view.classList.toggle("whole", box.w >= width);
       placeShapes();
     });
   };
@@ -119,12 +112,19 @@ const showFrame = (root, data) => {
     event.preventDefault();
     zoom(Math.exp(-event.deltaY / 400), ...pointOf(event));
   }, { passive: false });
-  let grip = null;
-  view.addEventListener("pointerdown", (event) => { grip = [event.clientX, event.clientY]; });
+  // One pointer moves the picture, two zoom it.
+  const grips = new Map();
+  const middle = () => [...grips.values()].reduce(([x, y], [px, py]) => [x + px / grips.size, y + py / grips.size], [0, 0]);
+  const apart = () => { const [one, two] = grips.values(); return two ? Math.hypot(one[0] - two[0], one[1] - two[1]) : 0; };
+  view.addEventListener("pointerdown", (event) => { grips.set(event.pointerId, [event.clientX, event.clientY]); });
+  for (const end of ["pointerup", "pointercancel", "pointerleave"]) view.addEventListener(end, (event) => grips.delete(event.pointerId));
   view.addEventListener("pointermove", (event) => {
-    if (grip && event.buttons) {
-      move((grip[0] - event.clientX) * unit(), (grip[1] - event.clientY) * unit());
-      grip = [event.clientX, event.clientY];
+    if (grips.has(event.pointerId) && event.buttons) {
+      const [from, wide] = [middle(), apart()];
+      grips.set(event.pointerId, [event.clientX, event.clientY]);
+      const to = middle();
+      move((from[0] - to[0]) * unit(), (from[1] - to[1]) * unit());
+      if (wide) zoom(apart() / wide, ...pointOf({ clientX: to[0], clientY: to[1] }));
     } else if (event.target.star) {
       tell(event.target.star);
     }
@@ -200,35 +200,7 @@ const showFrame = (root, data) => {
   });
 
   // Figures.
-  const ticks = (low, high, most) => {
-    const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].map((n) => n * power).find((s) => s >= raw);
-    const found = [];
-    for (let at = Math.ceil(low / step) * step; at <= high + step * 1e-6; at += step) found.push(Number(at.toPrecision(6)));
-    return found;
-  };
-  const figure = (caption, [xName, x0, x1], [yName, y0, y1]) => {
-    const holder = document.createElement("figure"), words = document.createElement("figcaption");
-    words.textContent = caption;
-    holder.appendChild(words);
-    byId("figures").appendChild(holder);
-    const W = 420, H = 260, left = 52, bottom = 38, top = 10, right = 12;
-    const svg = make(holder, "svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": caption });
-    const x = (v) => left + (v - x0) / (x1 - x0) * (W - left - right);
-    const y = (v) => H - bottom - (v - y0) / (y1 - y0) * (H - top - bottom);
-    for (const t of ticks(Math.min(x0, x1), Math.max(x0, x1), 6)) {
-      make(svg, "line", { class: "grid", x1: x(t), x2: x(t), y1: top, y2: H - bottom });
-      make(svg, "text", { x: x(t), y: H - bottom + 14, "text-anchor": "middle" }, t);
-    }
-    for (const t of ticks(Math.min(y0, y1), Math.max(y0, y1), 5)) {
-      make(svg, "line", { class: "grid", x1: left, x2: W - right, y1: y(t), y2: y(t) });
-      make(svg, "text", { x: left - 5, y: y(t) + 4, "text-anchor": "end" }, t);
-    }
-    make(svg, "text", { x: (left + W - right) / 2, y: H - 6, "text-anchor": "middle" }, xName);
-    make(svg, "text", { x: 12, y: (H - bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(H - bottom) / 2})` }, yName);
-    make(svg, "path", { class: "axis", d: `M${left} ${top}V${H - bottom}H${W - right}` });
-    return { svg, x, y };
-  };
+  const figure = (...of) => makeFigure(byId("figures"), ...of);
   const dot = (plot, star, x, y) => {
     const node = make(plot.svg, "circle", { class: "dot", cx: plot.x(x), cy: plot.y(y), r: 2.2 });
     node.addEventListener("pointerenter", () => tell(star));

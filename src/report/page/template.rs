@@ -31,6 +31,7 @@ pub(super) fn render(kind: &Kind, values: Value, data: &impl Serialize) -> io::R
     let script = [
         "\"use strict\";\n(() => {\n",
         include_str!("table.js"),
+        include_str!("figure.js"),
         kind.script,
         "})();\n",
     ];
