@@ -3,7 +3,7 @@
 import init, * as starpipe from "./starpipe.js";
 
 globalThis.starpipeProgress = (stage, share) => postMessage({ stage, share });
-const ready = init();
+const ready = init({ module_or_path: new URL("starpipe_bg.wasm", import.meta.url) });
 let solver;
 /** The frame that was solved last, and what it was solved from. */
 let last = { key: "", solved: null };
