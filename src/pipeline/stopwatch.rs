@@ -102,3 +102,19 @@ impl<'a> Stopwatch<'a> {
 fn milliseconds(from: Instant, to: Instant) -> f64 {
     to.duration_since(from).as_secs_f64() * 1e3
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn each_stage_that_is_done_is_told() {
+        let told = Mutex::new(Vec::new());
+        let on_stage = |stage| told.lock().unwrap().push(stage);
+        let mut clock = Stopwatch::start(Some(&on_stage));
+        clock.lap(Stage::Read);
+        clock.lap(Stage::Detect);
+        assert_eq!(*told.lock().unwrap(), [Stage::Read, Stage::Detect]);
+    }
+}

@@ -164,7 +164,7 @@ const sentence = (report) => {
   const field = optics.fov_x_deg && optics.fov_y_deg ? `${optics.fov_x_deg.toFixed(2)}° × ${optics.fov_y_deg.toFixed(2)}°` : "a wide part";
   const hours = attitude.ra_deg / 15, minutes = Math.round((hours % 1) * 60) % 60;
   const brightest = named ? ` The brightest star with a name is ${named.name} (V ${named.vmag.toFixed(2)}).` : "";
-  return `${report.frame} shows ${field} of the sky around right ascension ${Math.floor(hours)} h ${minutes} min, declination ${attitude.dec_deg.toFixed(1)}°: ${match.matched} stars are identified, the faintest of V ${report.magnitude.faintest_vmag.toFixed(1)}.${brightest}`;
+  return `${report.frame} shows ${field} of the sky around right ascension ${Math.floor(hours)} h ${minutes} min, declination ${attitude.dec_deg.toFixed(1).replace("-", "−")}°: ${match.matched} stars are identified, the faintest of V ${report.magnitude.faintest_vmag.toFixed(1)}.${brightest}`;
 };
 
 const showResult = (picture) => {

@@ -136,6 +136,21 @@ mod tests {
     }
 
     #[test]
+    fn a_view_has_the_answer_and_neither_style_nor_scripts() {
+        let (solution, report) = frame();
+        let pixels = Frame::new(400, 300, vec![0.5; 400 * 300]).unwrap();
+        let shown = Shown::new("a <b>.tif", &pixels);
+        let view = view(&report, &solution, &shown, &OverlayOptions::default()).unwrap();
+        assert!(view.html.contains("Not identified") && view.html.contains("id=\"view\""));
+        assert!(view.html.contains("a &lt;b&gt;.tif"));
+        for mark in ["<script", "<style", "<html", "style=\""] {
+            assert!(!view.html.contains(mark), "{mark}");
+        }
+        let data: serde_json::Value = serde_json::from_str(&view.data).unwrap();
+        assert_eq!(data["width"], 400);
+    }
+
+    #[test]
     fn a_page_needs_no_other_file() {
         let (solution, report) = frame();
         let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
