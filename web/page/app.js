@@ -1,9 +1,9 @@
 import { showDefocus } from "./defocus.js";
+import { byId } from "./dom.js";
 import { showLimit } from "./limit.js";
 import { photo } from "./photo.js";
 
 const TABS = ["photo", "limit", "defocus"];
-const byId = (id) => document.getElementById(id);
 
 /** What follows a # in the address: the tab, and its settings. */
 const place = () => {

@@ -1,8 +1,8 @@
 // The tab of the radius of spots.
+import { byId, factsOf, pathThrough } from "./dom.js";
 import { Engine, Stopped } from "./engine.js";
 import { make, makeFigure } from "./views.js";
 
-const byId = (id) => document.getElementById(id);
 const PAPER = "paper";
 const engine = new Engine((_, share) => { byId("defocus-done").value = share; });
 let isSetUp = null;
@@ -50,11 +50,7 @@ const show = (report) => {
     facts.push([`Error of ${required_error_px} px or less`, smallest ? `from ${spot(smallest)} to ${spot(largest)}` : "no radius meets it"]);
   }
   if (star.present) facts.push(["The camera as it is", `${spot(star.present)}: error ${star.present.error_px.toFixed(4)} px`]);
-  byId("defocus-facts").replaceChildren(...facts.map(([name, value]) => {
-    const fact = document.createElement("div");
-    fact.append(Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }));
-    return fact;
-  }));
+  byId("defocus-facts").replaceChildren(...factsOf(facts));
   draw(star);
 };
 
@@ -66,7 +62,7 @@ const draw = (star) => {
   const plot = makeFigure(holder, "Error of the centroid over the radius of the spot; the dashed line is the bound", ["radius σ (px)", Math.min(...radii), Math.max(...radii)], ["error (px)", 0, most]);
   const path = (key, kind) => {
     const rows = measured.filter((row) => row[key] !== null && row[key] <= most);
-    if (rows.length > 1) make(plot.svg, "path", { class: kind, d: rows.map((row, at) => `${at ? "L" : "M"}${plot.x(row.radius_px)} ${plot.y(row[key])}`).join("") });
+    if (rows.length > 1) make(plot.svg, "path", { class: kind, d: pathThrough(plot, rows.map((row) => [row.radius_px, row[key]])) });
   };
   path("bound_px", "bound");
   path("smooth_error_px", "line");
@@ -76,7 +72,7 @@ const draw = (star) => {
   if (limits.length > 1) {
     const all = limits.map((row) => row.limit_vmag);
     const reach = makeFigure(holder, "Limit over the radius: half of the stars of this magnitude are found", ["radius σ (px)", limits[0].radius_px, limits[limits.length - 1].radius_px], ["V (mag)", Math.min(...all) - 0.1, Math.max(...all) + 0.1]);
-    make(reach.svg, "path", { class: "line", d: limits.map((row, at) => `${at ? "L" : "M"}${reach.x(row.radius_px)} ${reach.y(row.limit_vmag)}`).join("") });
+    make(reach.svg, "path", { class: "line", d: pathThrough(reach, limits.map((row) => [row.radius_px, row.limit_vmag])) });
   }
   byId("defocus-figures").replaceChildren(holder);
 };

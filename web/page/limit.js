@@ -1,10 +1,19 @@
 // The tab of the sensitivity model.
+import { byId, factsOf, pathThrough } from "./dom.js";
 import { Engine } from "./engine.js";
 import { make, makeFigure } from "./views.js";
 
-const byId = (id) => document.getElementById(id);
+/**
+ * @typedef {object} Slider
+ * @property {string[]} names
+ * @property {string} title
+ * @property {[number, number]} ends
+ * @property {boolean} log
+ * @property {HTMLInputElement} [range]
+ * @property {HTMLInputElement} [number]
+ */
 
-/** A slider: parameters that it sets, title, ends, and whether its scale is logarithmic. */
+/** The sliders: parameters that one sets, title, ends, and whether its scale is logarithmic. @type {Slider[]} */
 const SLIDERS = [
   { names: ["aperture_mm"], title: "Aperture (mm)", ends: [1, 1000], log: true },
   { names: ["focal_length_mm"], title: "Focal length (mm)", ends: [2, 4000], log: true },
@@ -20,13 +29,15 @@ const STEPS = 1000, WAIT_MS = 120, CURVE_POINTS = 31, CURVE_REACH = 8;
 const engine = new Engine(() => {});
 /** @type {{ name: string, about: string, parameters: { name: string, value: number | null }[] }[]} */ let presets = [];
 /** The values that differ from the preset, by parameter. @type {Record<string, number>} */ let values = {};
-let isSetUp = null;
+/** @type {Promise<void> | null} */ let isSetUp = null;
 
+/** @param {Slider} slider @param {number} step */
 const valueAt = ({ ends: [low, high], log }, step) => {
   const share = step / STEPS;
   const value = log ? low * (high / low) ** share : low + (high - low) * share;
   return Number(value.toPrecision(3));
 };
+/** @param {Slider} slider @param {number} value */
 const stepOf = ({ ends: [low, high], log }, value) => {
   const share = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
   return Math.round(Math.min(Math.max(share, 0), 1) * STEPS);
@@ -114,11 +125,7 @@ const show = (row) => {
     ["Equations", row.reading === "paper" ? "the paper's own" : "physical"],
   ];
   if (row.faintest) facts.splice(3, 0, ["Faintest star to be expected in a field", `V ${row.faintest.mean_vmag.toFixed(2)} ± ${row.faintest.sigma_mag.toFixed(2)}`]);
-  byId("limit-facts").replaceChildren(...facts.map(([name, value]) => {
-    const fact = document.createElement("div");
-    fact.append(Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: value }));
-    return fact;
-  }));
+  byId("limit-facts").replaceChildren(...factsOf(facts));
   const body = byId("limit-budget").tBodies[0];
   body.replaceChildren();
   for (const [name, value] of Object.entries(row.budget)) {
@@ -146,7 +153,7 @@ const drawCurves = async (row, number) => {
     const all = points.map(([, v]) => v);
     const plot = makeFigure(holder, `Half are found at, over the ${slider.title.toLowerCase()}; the dot is this camera`,
       [`log10 ${slider.title.toLowerCase()}`, points[0][0], points[points.length - 1][0]], ["V (mag)", Math.min(...all) - 0.2, Math.max(...all) + 0.2]);
-    make(plot.svg, "path", { class: "line", d: points.map(([x, y], at) => `${at ? "L" : "M"}${plot.x(x)} ${plot.y(y)}`).join("") });
+    make(plot.svg, "path", { class: "line", d: pathThrough(plot, points) });
     if (row.detector.limit50_vmag !== null) make(plot.svg, "circle", { class: "point", cx: plot.x(Math.log10(value)), cy: plot.y(row.detector.limit50_vmag), r: 4 });
   }
   byId("limit-figures").replaceChildren(holder);

@@ -1,8 +1,7 @@
 // The tab of photographs: pictures wait in a queue, one is solved at a time, one is shown.
+import { byId } from "./dom.js";
 import { Engine, Stopped } from "./engine.js";
 import { showFrame } from "./views.js";
-
-const byId = (id) => document.getElementById(id);
 
 /** Stages as people are told of them, in their order. */
 const STAGES = [
@@ -41,7 +40,7 @@ const engine = new Engine((stage, share) => tellStage(stage, share));
 
 /** The options that the form states, as JSON. */
 const stated = () => {
-  const form = byId("hints").querySelector("form");
+  const form = byId("hint-form");
   const pair = (text) => text.split(/[,\s]+/).filter(Boolean).map((part) => Number(part.replace("−", "-")));
   const options = {};
   for (const [name, given] of new FormData(form)) {
@@ -87,6 +86,7 @@ const add = (files) => {
   for (const file of files) {
     const button = document.createElement("button");
     button.type = "button";
+    /** @type {Picture} */
     const picture = { file, number: pictures.length, state: "waits", options: stated(), result: null, error: "", button };
     button.addEventListener("click", () => choose(picture));
     const item = document.createElement("li");
@@ -210,7 +210,7 @@ const save = (blob, name) => {
 
 /** The layers of the sky that are shown are those of the annotated picture. */
 const layers = () => {
-  const isOn = (name) => Boolean(document.querySelector(`#answer [data-layer="${name}"]`)?.checked);
+  const isOn = (name) => document.querySelector(`#answer [data-layer="${name}"]:checked`) !== null;
   return JSON.stringify({
     all_rings: isOn("unidentified"), constellations: isOn("constellations"), deep_sky: isOn("deepsky"),
     equatorial: isOn("equatorial"), horizontal: isOn("horizontal"),
@@ -261,7 +261,7 @@ const remedies = (picture, report) => {
 export const photo = () => {
   for (const [, text] of STAGES) byId("stages").appendChild(Object.assign(document.createElement("li"), { textContent: text }));
   for (const id of ["files", "camera"]) {
-    byId(id).addEventListener("change", ({ target }) => { add([...target.files]); target.value = ""; });
+    byId(id).addEventListener("change", () => { add([...byId(id).files]); byId(id).value = ""; });
   }
   const drop = byId("drop");
   addEventListener("dragover", (event) => { event.preventDefault(); drop.classList.add("over"); });
@@ -272,7 +272,7 @@ export const photo = () => {
     add([...(event.dataTransfer?.files ?? [])]);
   });
   byId("cancel").addEventListener("click", () => engine.stop());
-  byId("hints").querySelector("form").addEventListener("submit", (event) => {
+  byId("hint-form").addEventListener("submit", (event) => {
     event.preventDefault();
     if (!chosen || chosen.state === "runs") return;
     Object.assign(chosen, { state: "waits", options: stated(), result: null, error: "" });
