@@ -14,6 +14,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .input_path(wasm)
         .web(true)?
         .typescript(false)
+        .remove_name_section(true)
+        .remove_producers_section(true)
         .out_name("starpipe")
         .generate(directory)?;
     Ok(())
