@@ -42,11 +42,20 @@ const showFrame = (root, data) => {
     star.shape.star = star;
     if (star.residual !== undefined) star.arrow = make(layers.residuals, "path", { class: "arrow" });
   }
+  let chosen = null;
   const placeShapes = () => {
     const u = unit();
+    // As many rings as leave the picture to be seen, brightest first; closer up there are more.
+    const AREA_PER_RING = 900;
+    let rings = Math.ceil(view.clientWidth * view.clientHeight / AREA_PER_RING);
     for (const star of stars) {
       const { x, y, shape } = star;
       const r = radius(star) * u;
+      if (star.kind === "identified") {
+        const isInView = x > box.x && x < box.x + box.w && y > box.y && y < box.y + box.h;
+        if (isInView) rings -= 1;
+        shape.style.visibility = star === chosen || (isInView && rings >= 0) ? "" : "hidden";
+      }
       if (star.kind === "identified") {
         shape.setAttribute("cx", x); shape.setAttribute("cy", y); shape.setAttribute("r", r);
       } else if (star.kind === "other") {
@@ -165,7 +174,6 @@ const showFrame = (root, data) => {
     if (star.flags.length) parts.push(star.flags.join(" "));
     byId("under").textContent = parts.join(" · ");
   };
-  let chosen = null;
   const choose = (star, center) => {
     for (const node of chosen ? [chosen.shape, table.rowOf(chosen)] : []) node.classList.remove("chosen");
     chosen = star;
@@ -177,6 +185,7 @@ const showFrame = (root, data) => {
     } else {
       row.scrollIntoView({ block: "nearest" });
     }
+    show();
     tell(star);
   };
 
