@@ -14,7 +14,8 @@ const { chromium } = require("playwright-core");
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 
 const SOLVE_MS = 300_000, SETTLE_MS = 300;
-// Functions of the system's library differ from those of the page in the last bit; see docs/web.md.
+// Functions of the system's library differ from those of the page in the last bit; see docs/web.md. Of values
+// above 1 this is a part, of others the difference itself.
 const LARGEST_DIFFERENCE = 1e-5;
 const words = process.argv.slice(2);
 const option = (name) => { const at = words.indexOf(name); return at < 0 ? null : words.splice(at, 2)[1]; };
@@ -103,9 +104,9 @@ const programJson = (args, cwd) => {
 const compare = (what, ours, theirs) => {
   const found = differences(ours, theirs);
   const numbers = found.filter(({ one, other }) => typeof one === "number" && typeof other === "number");
-  const most = numbers.reduce((most, { one, other }) => Math.max(most, Math.abs(one - other) / Math.max(Math.abs(one), Math.abs(other))), 0);
+  const most = numbers.reduce((most, { one, other }) => Math.max(most, Math.abs(one - other) / Math.max(Math.abs(one), Math.abs(other), 1)), 0);
   if (!found.length) return "the same in every digit";
-  const told = `${found.length} values differ, ${numbers.length} of them numbers, by up to ${most.toExponential(1)} of themselves; first ${JSON.stringify(found[0])}`;
+  const told = `${found.length} values differ, ${numbers.length} of them numbers, by up to ${most.toExponential(1)}; first ${JSON.stringify(found[0])}`;
   check(numbers.length === found.length && most < LARGEST_DIFFERENCE, `${what}: ${told}`);
   return told;
 };
