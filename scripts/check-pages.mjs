@@ -76,6 +76,14 @@ async function useFrame(page, shot) {
   await page.keyboard.press("0");
   await page.waitForTimeout(SETTLE_MS);
   check((await box()) === whole, "the key 0 does not show the whole frame");
+  const sky = page.locator("[data-layer=constellations]");
+  if (await sky.count()) {
+    const line = page.locator("#view .constellations path").first();
+    check(!(await line.isVisible()), "constellations are shown before they are wanted");
+    await sky.check();
+    check(await line.isVisible(), "constellations are not shown");
+    await sky.uncheck();
+  }
   await page.locator("[data-layer=identified]").uncheck();
   const hidden = await page.locator("#view g[style*='none'] circle").count();
   check(hidden === (await page.locator("#view circle").count()), "a layer stays");

@@ -9,11 +9,8 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::identify::Photometry;
-use starpipe::model::defocus::{EnergyStudy, Grid, Lens, PeakStudy};
 use starpipe::model::sensitivity::PredictionRow;
-use starpipe::study::defocus::{
-    Caller, DarkNoise, DefocusReport, Noise, Plan, StarModel, default_v_mag,
-};
+use starpipe::study::defocus::{Caller, DarkNoise, DefocusReport, Noise, Plan};
 use starpipe::study::robustness::{
     Case, CaseResult, Mirrored, Protocol, TrialResults, run_one, standard_cases,
 };
@@ -201,44 +198,21 @@ fn of_camera(
         None => Noise::of_camera(&scenario),
     };
     let noise = noise.map_err(exception)?;
-    let scenario = noise.replacing_in(scenario);
-    let vmag = match vmag {
-        [] => vec![default_v_mag(&scenario).map_err(exception)?],
-        given => given.to_vec(),
-    };
-    let star = |&v_mag: &f64| {
-        let mut star = EnergyStudy::new(scenario.clone(), v_mag);
-        star.trials = trials.unwrap_or(star.trials);
-        StarModel::Energy(Box::new(star))
-    };
-    Ok(Plan {
-        stars: vmag.iter().map(star).collect(),
-        grid: Grid::around(noise.value()),
-        lens: Some(Lens::of(&scenario.camera, 0.0)),
-        present_px: Some(scenario.camera.spot_sigma_px),
-        noise,
-        required_px: Vec::new(),
-        seed: 0,
-    })
+    let plan = Plan::of_camera(scenario, noise, vmag).map_err(exception)?;
+    Ok(with_trials(plan, trials))
 }
 
 fn of_paper(darks: Option<DarkNoise>, trials: Option<usize>) -> PyResult<Plan> {
-    let default = PeakStudy::default();
-    let star = PeakStudy {
-        trials: trials.unwrap_or(default.trials),
-        ..default
-    };
     let noise = match darks {
         Some(darks) => Noise::of_all_pixels(darks).map_err(exception)?,
         None => Noise::of_paper(),
     };
-    Ok(Plan {
-        stars: vec![StarModel::Peak(star)],
-        grid: Grid::of_paper(),
-        noise,
-        lens: None,
-        present_px: None,
-        required_px: Vec::new(),
-        seed: 0,
-    })
+    Ok(with_trials(Plan::of_paper(noise), trials))
+}
+
+fn with_trials(plan: Plan, trials: Option<usize>) -> Plan {
+    match trials {
+        Some(trials) => plan.with_trials(trials),
+        None => plan,
+    }
 }

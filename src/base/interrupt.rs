@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::Instant;
+use web_time::Instant;
 
 /// Tells long work whether to end. It is asked every few milliseconds, from any thread.
 ///

@@ -56,6 +56,14 @@ pub fn caught<R>(work: impl FnOnce() -> R) -> Result<R, Panicked> {
     })
 }
 
+/// The latest panic, where it could not be caught: a program in WebAssembly ends with it.
+pub fn latest() -> Option<Panicked> {
+    LATEST
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone()
+}
+
 /// From now on no panic prints anything, on any thread, unless `RUST_BACKTRACE` is set: for programs
 /// in which [`caught`] surrounds everything, the work that is shared among threads included.
 pub fn silence() {

@@ -57,6 +57,31 @@ pub fn write_row<R, W: io::Write>(
     writer.write_record(columns.iter().map(|column| (column.value)(row).to_csv()))
 }
 
+/// The table that `writer` has written, with names as terminals and spreadsheets may show them: on one
+/// line, and no formulas ([`table_name`]).
+///
+/// # Errors
+/// What is written not being a table of UTF-8.
+pub fn finished(writer: csv::Writer<Vec<u8>>) -> io::Result<String> {
+    let bytes = writer
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
+    let mut rows = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(bytes.as_slice());
+    let mut shown = csv::WriterBuilder::new()
+        .flexible(true)
+        .from_writer(Vec::with_capacity(bytes.len()));
+    for row in rows.records() {
+        shown.write_record(row?.iter().map(table_name))?;
+    }
+    let bytes = shown
+        .into_inner()
+        .map_err(csv::IntoInnerError::into_error)?;
+    String::from_utf8(bytes).map_err(io::Error::other)
+}
+
 /// What the values of a column mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Meaning {

@@ -195,7 +195,7 @@ pub fn solve_centroids(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Solution {
-    let mut clock = Stopwatch::start();
+    let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
         source: ScaleSource::User,

@@ -1,6 +1,7 @@
 //! What the stages need and what does not change from frame to frame.
 
 use super::held::HeldCamera;
+use super::stopwatch::Stage;
 use crate::base::epoch::ObservationDate;
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
@@ -13,7 +14,8 @@ use crate::sky::places::AttitudeFrame;
 use jiff::SignedDuration;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use web_time::Instant;
 
 /// How long a frame may take by default where many are solved, in seconds.
 pub const DEFAULT_TIME_LIMIT_S: f64 = 60.0;
@@ -57,6 +59,9 @@ pub struct Context<'a> {
     pub as_stored: bool,
     /// How long a frame may take, from where its reading begins.
     pub time_limit: Option<Duration>,
+    /// Told of each stage that is done; a stage may come again.
+    #[doc(hidden)]
+    pub on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
 impl<'a> Context<'a> {
@@ -78,6 +83,7 @@ impl<'a> Context<'a> {
             effort: Effort::Normal,
             as_stored: false,
             time_limit: None,
+            on_stage: None,
         }
     }
 

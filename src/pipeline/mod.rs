@@ -58,4 +58,6 @@ pub use solve::{solve_file, solve_frame};
 #[doc(hidden)]
 pub use solve::{solve_guarded, solve_read};
 pub use star_field::star_field;
+#[doc(hidden)]
+pub use stopwatch::Stage;
 pub use stopwatch::Timing;

@@ -69,7 +69,7 @@ pub fn solve_read(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<(Solution, Frame<'static>), Error> {
-    let mut clock = Stopwatch::start();
+    let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     let mut frame = read(&mut workspace.frames)?;
     // A flat evens out the levels by which a mosaic is found.
@@ -133,7 +133,7 @@ pub fn solve_frame(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
-    let clock = Stopwatch::start();
+    let clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     let input = Input {
         frame,
@@ -173,7 +173,7 @@ struct Input<'a> {
     memory: MemoryLimit,
     /// The mosaic of a raw color frame.
     mosaic: Option<Mosaic>,
-    clock: Stopwatch,
+    clock: Stopwatch<'a>,
 }
 
 /// The spine: every stage once, in order.

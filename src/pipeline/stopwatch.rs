@@ -1,6 +1,8 @@
 //! Times the stages.
 
-use std::time::{Duration, Instant};
+use serde::Serialize;
+use std::time::Duration;
+use web_time::Instant;
 
 /// Time that each stage took, in milliseconds; 0 for a stage that was not needed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -23,31 +25,41 @@ pub struct Timing {
 }
 
 /// A stage that is timed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stage {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Stage {
+    /// Reading, decoding and calibrating.
     Read,
+    /// Detecting and measuring the sources.
     Detect,
+    /// Finding out where the camera points.
     Pointing,
+    /// Finding out which star is which.
     Naming,
+    /// What follows from the names.
     Identify,
+    /// Photometry, and comparison with the stated camera.
     Photometry,
 }
 
 /// Times one frame from stage to stage.
-#[derive(Debug)]
-pub(super) struct Stopwatch {
+pub(super) struct Stopwatch<'a> {
     start: Instant,
     lap_start: Instant,
     timing: Timing,
+    on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 
-impl Stopwatch {
-    pub(super) fn start() -> Self {
+impl<'a> Stopwatch<'a> {
+    /// Starts, and tells `on_stage` of each stage that is done.
+    pub(super) fn start(on_stage: Option<&'a (dyn Fn(Stage) + Sync)>) -> Self {
         let now = Instant::now();
         Self {
             start: now,
             lap_start: now,
             timing: Timing::default(),
+            on_stage,
         }
     }
 
@@ -73,6 +85,9 @@ impl Stopwatch {
         if matches!(stage, Stage::Pointing | Stage::Naming | Stage::Identify) {
             self.timing.identify_ms += lap_ms;
         }
+        if let Some(on_stage) = self.on_stage {
+            on_stage(stage);
+        }
     }
 
     /// The times of the stages, and the total until now.
@@ -86,4 +101,20 @@ impl Stopwatch {
 
 fn milliseconds(from: Instant, to: Instant) -> f64 {
     to.duration_since(from).as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    #[test]
+    fn each_stage_that_is_done_is_told() {
+        let told = Mutex::new(Vec::new());
+        let on_stage = |stage| told.lock().unwrap().push(stage);
+        let mut clock = Stopwatch::start(Some(&on_stage));
+        clock.lap(Stage::Read);
+        clock.lap(Stage::Detect);
+        assert_eq!(*told.lock().unwrap(), [Stage::Read, Stage::Detect]);
+    }
 }

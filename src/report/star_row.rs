@@ -1,7 +1,7 @@
 //! The columns of a star: those of the JSON, in every table.
 
 use super::frame_report::{FrameReport, StarReport};
-use crate::base::table::{Column, columns, write_row};
+use crate::base::table::{Column, columns, finished, write_row};
 use std::io;
 
 /// A detection, with its frame.
@@ -79,6 +79,20 @@ impl FrameReport {
     pub fn write_table_rows<W: io::Write>(&self, writer: &mut csv::Writer<W>) -> csv::Result<()> {
         let columns = StarRow::columns();
         StarRow::of_frame(self).try_for_each(|row| write_row(writer, &columns, &row))
+    }
+
+    /// The detections as a CSV table, brightest first.
+    ///
+    /// # Errors
+    /// None for reports that [`new`](Self::new) made.
+    #[doc(hidden)]
+    pub fn to_csv(&self, with_header: bool) -> io::Result<String> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        if with_header {
+            write_table_header(&mut writer)?;
+        }
+        self.write_table_rows(&mut writer)?;
+        finished(writer)
     }
 }
 

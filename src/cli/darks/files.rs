@@ -1,8 +1,8 @@
 //! Master darks, the noise of each pixel, and the hot pixels as files.
 
 use crate::cli::output::master::{fits_image, header};
-use crate::cli::output::rows::finished;
 use starpipe::base::size::Size;
+use starpipe::base::table::finished;
 use starpipe::calibration::darks::{Darks, ExposureGroup, HotPixelRow};
 
 /// Names and contents of the files for `--out`.
@@ -56,5 +56,5 @@ pub(super) fn hot_pixels_table(darks: &Darks) -> anyhow::Result<String> {
     for hot in &darks.hot_pixels {
         writer.serialize(HotPixelRow::from(hot))?;
     }
-    finished(writer)
+    Ok(finished(writer)?)
 }

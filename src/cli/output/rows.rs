@@ -2,7 +2,8 @@
 
 use anyhow::Context;
 use serde::Serialize;
-use starpipe::base::format::{json_escaped, table_name};
+use starpipe::base::format::json_escaped;
+use starpipe::base::table::finished;
 
 /// One JSON object on one line.
 pub(crate) fn json_line(value: &impl Serialize) -> anyhow::Result<String> {
@@ -27,27 +28,5 @@ pub(crate) fn csv_table<R: Serialize>(rows: impl Iterator<Item = R>) -> anyhow::
     for row in rows {
         writer.serialize(row)?;
     }
-    finished(writer)
-}
-
-/// The table that `writer` has written, with names as terminals and spreadsheets may show them: on one
-/// line, and no formulas ([`table_name`]).
-pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> anyhow::Result<String> {
-    let bytes = writer
-        .into_inner()
-        .map_err(csv::IntoInnerError::into_error)?;
-    let mut rows = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(bytes.as_slice());
-    let mut shown = csv::WriterBuilder::new()
-        .flexible(true)
-        .from_writer(Vec::with_capacity(bytes.len()));
-    for row in rows.records() {
-        shown.write_record(row?.iter().map(table_name))?;
-    }
-    let bytes = shown
-        .into_inner()
-        .map_err(csv::IntoInnerError::into_error)?;
-    Ok(String::from_utf8(bytes)?)
+    Ok(finished(writer)?)
 }

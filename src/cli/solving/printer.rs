@@ -2,13 +2,11 @@
 
 use super::frame_table::{self, Summary};
 use super::options::{OutputOptions, ReportFormat};
-use super::result_files::table;
 use crate::cli::exit::Tally;
-use crate::cli::output::rows::finished;
 use crate::cli::output::stdout::print;
 use starpipe::archive::FrameRow;
 use starpipe::base::remedy::OptionNames;
-use starpipe::base::table::write_row;
+use starpipe::base::table::{finished, write_row};
 use starpipe::report::{FrameReport, TextOptions};
 use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
@@ -83,7 +81,7 @@ impl Printer {
             ReportFormat::Table if is_first => frame_table::header() + &frame_table::row(report),
             ReportFormat::Table => frame_table::row(report),
             ReportFormat::Json => report.to_json_line()? + "\n",
-            ReportFormat::Csv => table(report, is_first)?,
+            ReportFormat::Csv => report.to_csv(is_first)?,
             ReportFormat::FramesCsv => frame_rows(row, is_first)?,
         })
     }
@@ -99,5 +97,5 @@ fn frame_rows(row: Option<&FrameRow>, is_first: bool) -> anyhow::Result<String> 
     if let Some(row) = row {
         write_row(&mut writer, &columns, row)?;
     }
-    finished(writer)
+    Ok(finished(writer)?)
 }

@@ -6,10 +6,9 @@ use crate::cli::input::stdin::is_stdin;
 use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
-use crate::cli::output::rows::finished;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
-use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs, write_table_header};
+use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs};
 use starpipe::sky::catalog::Catalog;
 
 /// Writes result files into a directory, if one is given.
@@ -46,7 +45,7 @@ impl<'a> ResultFiles<'a> {
         let json = report.to_json_line()? + "\n";
         let mut files = vec![
             (path("json"), json.into_bytes()),
-            (path("csv"), table(report, true)?.into_bytes()),
+            (path("csv"), report.to_csv(true)?.into_bytes()),
         ];
         let name = image.to_path();
         let title = name.file_name().unwrap_or(name.as_os_str());
@@ -107,14 +106,4 @@ impl<'a> ResultFiles<'a> {
         buffers.set_memory(self.memory);
         Colors::read(image.path, frame, &mut buffers)
     }
-}
-
-/// The stars of `report` as CSV.
-pub(super) fn table(report: &FrameReport, with_header: bool) -> anyhow::Result<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    if with_header {
-        write_table_header(&mut writer)?;
-    }
-    report.write_table_rows(&mut writer)?;
-    finished(writer)
 }

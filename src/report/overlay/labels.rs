@@ -53,6 +53,17 @@ pub(super) struct Room<'a> {
 }
 
 impl<'a> Room<'a> {
+    /// A picture of `image` pixels, all of it free.
+    #[cfg(feature = "page")]
+    pub(super) fn all(image: [f32; 2], unit: f32) -> Self {
+        Self {
+            marked: Vec::new(),
+            taken: Vec::new(),
+            image,
+            unit,
+        }
+    }
+
     /// The marks that are shown.
     pub(super) fn marked(&self) -> &[&'a Mark] {
         &self.marked

@@ -20,6 +20,8 @@
 mod canvas;
 mod encode;
 mod labels;
+#[cfg(feature = "page")]
+mod layers;
 mod legend;
 mod letters;
 mod mark;
@@ -48,6 +50,8 @@ use std::io;
 
 #[cfg(feature = "page")]
 pub(super) use encode::jpeg;
+#[cfg(feature = "page")]
+pub(super) use layers::{SkyLayer, sky_layers};
 pub use options::{LabelKind, OverlayFormat, OverlayOptions, Rings, SkyLayers, Stretch};
 pub use shown::Shown;
 

@@ -103,6 +103,17 @@ impl Picture {
         }
     }
 
+    /// The place of a frame of this size, pixel by pixel, with nothing in it.
+    #[cfg(feature = "page")]
+    pub(super) fn empty(size: Size) -> Self {
+        Self {
+            width: size.width,
+            height: size.height,
+            pixels: Vec::new(),
+            scale: 1.0,
+        }
+    }
+
     /// `frame` in grey, with a dark sky brightened, each `side` × `side` pixels as one.
     #[cfg(feature = "page")]
     pub(super) fn reduced(frame: &Frame<'_>, side: usize) -> Self {

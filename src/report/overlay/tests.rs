@@ -271,3 +271,30 @@ fn the_sky_is_drawn_where_it_is_wanted() {
     let nothing = texts(wanted, &solution(WIDTH, HEIGHT, not_identified()));
     assert!(!nothing.contains(&"M 36".to_owned()));
 }
+
+#[cfg(feature = "page")]
+#[test]
+fn layers_for_pages_are_in_pixels_of_the_frame() {
+    let Outcome::Identified(found) = identified(0.0, false) else {
+        unreachable!("it is identified");
+    };
+    let size = crate::base::size::Size::new(WIDTH, HEIGHT);
+    let layers = serde_json::to_value(sky_layers(size, &found)).unwrap();
+    let keys: Vec<&str> = layers
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|layer| layer["key"].as_str().unwrap())
+        .collect();
+    // Without a site there is neither a horizon nor its grid.
+    assert_eq!(keys, ["equatorial", "deepsky", "constellations"]);
+    // The line of the centre's declination passes through the centre.
+    let lines = layers[0]["lines"].as_array().unwrap();
+    let centre = [(WIDTH - 1) as f64 / 2.0, (HEIGHT - 1) as f64 / 2.0];
+    let distance = |point: &serde_json::Value| {
+        (point[0].as_f64().unwrap() - centre[0]).hypot(point[1].as_f64().unwrap() - centre[1])
+    };
+    let points = lines.iter().flat_map(|line| line.as_array().unwrap());
+    let nearest = points.map(distance).fold(f64::INFINITY, f64::min);
+    assert!(nearest < 6.0, "{nearest}");
+}

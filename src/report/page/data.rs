@@ -1,10 +1,12 @@
 //! What the scripts of a page draw.
 
 use crate::base::format::to_decimals;
+use crate::base::size::Size;
 use crate::identify::StarMatch;
 use crate::pipeline::{Solution, Source};
 use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
+use crate::report::overlay::{SkyLayer, sky_layers};
 use serde::Serialize;
 
 /// The numbers of a page.
@@ -22,6 +24,8 @@ pub(super) struct PageData<'a> {
     zero_point_exposure_s: f64,
     limit50_vmag: Option<f64>,
     predicted_vmag: Option<f64>,
+    /// Lines and names of the sky.
+    pub(super) sky: Vec<SkyLayer>,
 }
 
 /// The columns of the detections, which take half of the room of rows with names.
@@ -73,6 +77,8 @@ impl<'a> PageData<'a> {
         let unlike = |(_, star): &(usize, &StarReport)| !star.is_star_like();
         let numbered = report.stars.iter().enumerate();
         let unlike_stars = numbered.filter(unlike).map(|(number, _)| number).collect();
+        let size = Size::new(report.width, report.height);
+        let found = solution.outcome.identification();
         let mut stars = StarColumns::default();
         for (star, offset) in report.stars.iter().zip(offsets) {
             stars.add(star, offset);
@@ -87,6 +93,7 @@ impl<'a> PageData<'a> {
             zero_point_exposure_s: report.exposure_s.filter(|_| is_rate).unwrap_or(1.0),
             limit50_vmag: photometry.and_then(|photometry| photometry.limit50_vmag),
             predicted_vmag: report.prediction.as_ref().and_then(|p| p.limit50_vmag),
+            sky: found.map_or_else(Vec::new, |found| sky_layers(size, found)),
         }
     }
 }

@@ -1,13 +1,6 @@
-  const data = JSON.parse(document.getElementById("data").textContent);
-  const NS = "http://www.w3.org/2000/svg";
-  const byId = (id) => document.getElementById(id);
-  const make = (parent, tag, attributes = {}, text) => {
-    const node = document.createElementNS(NS, tag);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    if (text !== undefined) node.textContent = text;
-    parent.appendChild(node);
-    return node;
-  };
+// Brings the elements of a frame in `root` to life: picture, figures and table.
+const showFrame = (root, data) => {
+  const byId = (id) => root.querySelector(`#${id}`);
   const { width, height } = data;
   const columns = Object.entries(data.stars);
   const stars = data.stars.x.map((_, row) => {
@@ -24,6 +17,13 @@
   // The picture: the view box is what is seen of the frame, in its pixels.
   const view = byId("view");
   const layers = {};
+  for (const { key, lines, circles, texts } of data.sky) {
+    const layer = layers[key] = make(view, "g", { class: `sky ${key}` });
+    for (const line of lines) make(layer, "path", { d: `M${line.map((at) => at.join(" ")).join("L")}` });
+    for (const [cx, cy, r] of circles) make(layer, "circle", { cx, cy, r });
+    for (const [text, [x, y]] of texts) make(layer, "text", { x, y }, text);
+  }
+  const skyTexts = view.querySelectorAll(".sky text");
   for (const name of ["other", "unidentified", "identified", "residuals", "names"]) layers[name] = make(view, "g");
   const box = { x: -0.5, y: -0.5, w: width, h: height };
   // Pixels of the frame in one of the screen.
@@ -42,11 +42,20 @@
     star.shape.star = star;
     if (star.residual !== undefined) star.arrow = make(layers.residuals, "path", { class: "arrow" });
   }
+  let chosen = null;
   const placeShapes = () => {
     const u = unit();
+    // As many rings as leave the picture to be seen, brightest first; closer up there are more.
+    const AREA_PER_RING = 900;
+    let rings = Math.ceil(view.clientWidth * view.clientHeight / AREA_PER_RING);
     for (const star of stars) {
       const { x, y, shape } = star;
       const r = radius(star) * u;
+      if (star.kind === "identified") {
+        const isInView = x > box.x && x < box.x + box.w && y > box.y && y < box.y + box.h;
+        if (isInView) rings -= 1;
+        shape.style.visibility = star === chosen || (isInView && rings >= 0) ? "" : "hidden";
+      }
       if (star.kind === "identified") {
         shape.setAttribute("cx", x); shape.setAttribute("cy", y); shape.setAttribute("r", r);
       } else if (star.kind === "other") {
@@ -60,6 +69,7 @@
         star.arrow.setAttribute("d", `M${x} ${y}L${ex} ${ey}l${(-star.dx - star.dy * 0.6) * b} ${(-star.dy + star.dx * 0.6) * b}M${ex} ${ey}l${(-star.dx + star.dy * 0.6) * b} ${(-star.dy - star.dx * 0.6) * b}`);
       }
     }
+    for (const node of skyTexts) { node.setAttribute("font-size", 12 * u); node.setAttribute("stroke-width", 3 * u); }
     placeNames(u);
   };
   // The brightest stars in view, where there is room.
@@ -87,6 +97,7 @@
       frame = 0;
       view.setAttribute("viewBox", `${box.x} ${box.y} ${box.w} ${box.h}`);
       view.classList.toggle("sharp", unit() < 0.34);
+      view.classList.toggle("whole", box.w >= width);
       placeShapes();
     });
   };
@@ -110,12 +121,19 @@
     event.preventDefault();
     zoom(Math.exp(-event.deltaY / 400), ...pointOf(event));
   }, { passive: false });
-  let grip = null;
-  view.addEventListener("pointerdown", (event) => { grip = [event.clientX, event.clientY]; });
+  // One pointer moves the picture, two zoom it.
+  const grips = new Map();
+  const middle = () => [...grips.values()].reduce(([x, y], [px, py]) => [x + px / grips.size, y + py / grips.size], [0, 0]);
+  const apart = () => { const [one, two] = grips.values(); return two ? Math.hypot(one[0] - two[0], one[1] - two[1]) : 0; };
+  view.addEventListener("pointerdown", (event) => { grips.set(event.pointerId, [event.clientX, event.clientY]); });
+  for (const end of ["pointerup", "pointercancel", "pointerleave"]) view.addEventListener(end, (event) => grips.delete(event.pointerId));
   view.addEventListener("pointermove", (event) => {
-    if (grip && event.buttons) {
-      move((grip[0] - event.clientX) * unit(), (grip[1] - event.clientY) * unit());
-      grip = [event.clientX, event.clientY];
+    if (grips.has(event.pointerId) && event.buttons) {
+      const [from, wide] = [middle(), apart()];
+      grips.set(event.pointerId, [event.clientX, event.clientY]);
+      const to = middle();
+      move((from[0] - to[0]) * unit(), (from[1] - to[1]) * unit());
+      if (wide) zoom(apart() / wide, ...pointOf({ clientX: to[0], clientY: to[1] }));
     } else if (event.target.star) {
       tell(event.target.star);
     }
@@ -129,11 +147,11 @@
     };
     if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
   });
-  for (const button of document.querySelectorAll("[data-zoom]")) {
+  for (const button of root.querySelectorAll("[data-zoom]")) {
     const factor = Number(button.dataset.zoom);
     button.addEventListener("click", () => (factor ? zoom(factor) : whole()));
   }
-  for (const input of document.querySelectorAll("[data-layer]")) {
+  for (const input of root.querySelectorAll("[data-layer]")) {
     const layer = layers[input.dataset.layer] || byId("picture");
     if (input.dataset.layer === "unidentified" && !stars.some((star) => star.id)) input.checked = true;
     const apply = () => { if (layer) layer.style.display = input.checked ? "" : "none"; };
@@ -156,7 +174,6 @@
     if (star.flags.length) parts.push(star.flags.join(" "));
     byId("under").textContent = parts.join(" · ");
   };
-  let chosen = null;
   const choose = (star, center) => {
     for (const node of chosen ? [chosen.shape, table.rowOf(chosen)] : []) node.classList.remove("chosen");
     chosen = star;
@@ -168,13 +185,14 @@
     } else {
       row.scrollIntoView({ block: "nearest" });
     }
+    show();
     tell(star);
   };
 
   // The table, with the marks in the picture of what is left in it.
   const text = (key) => (s) => s[key] || "";
   const column = (key, title, shown, isText = false) => ({ key, title, isText, text: shown, value: (s) => s[key] });
-  const table = makeTable(document.querySelector("section.table"), [
+  const table = makeTable(root.querySelector("section.table"), [
     column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true), column("hd", "HD", text("hd")),
     column("v", "V", (s) => number(s.v, 2)), column("snr", "SNR", (s) => s.snr ?? ""), column("flux", "Flux", (s) => s.flux ?? ""),
     column("x", "x", (s) => number(s.x, 2)), column("y", "y", (s) => number(s.y, 2)),
@@ -191,35 +209,7 @@
   });
 
   // Figures.
-  const ticks = (low, high, most) => {
-    const raw = (high - low) / most, power = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].map((n) => n * power).find((s) => s >= raw);
-    const found = [];
-    for (let at = Math.ceil(low / step) * step; at <= high + step * 1e-6; at += step) found.push(Number(at.toPrecision(6)));
-    return found;
-  };
-  const figure = (caption, [xName, x0, x1], [yName, y0, y1]) => {
-    const holder = document.createElement("figure"), words = document.createElement("figcaption");
-    words.textContent = caption;
-    holder.appendChild(words);
-    byId("figures").appendChild(holder);
-    const W = 420, H = 260, left = 52, bottom = 38, top = 10, right = 12;
-    const svg = make(holder, "svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": caption });
-    const x = (v) => left + (v - x0) / (x1 - x0) * (W - left - right);
-    const y = (v) => H - bottom - (v - y0) / (y1 - y0) * (H - top - bottom);
-    for (const t of ticks(Math.min(x0, x1), Math.max(x0, x1), 6)) {
-      make(svg, "line", { class: "grid", x1: x(t), x2: x(t), y1: top, y2: H - bottom });
-      make(svg, "text", { x: x(t), y: H - bottom + 14, "text-anchor": "middle" }, t);
-    }
-    for (const t of ticks(Math.min(y0, y1), Math.max(y0, y1), 5)) {
-      make(svg, "line", { class: "grid", x1: left, x2: W - right, y1: y(t), y2: y(t) });
-      make(svg, "text", { x: left - 5, y: y(t) + 4, "text-anchor": "end" }, t);
-    }
-    make(svg, "text", { x: (left + W - right) / 2, y: H - 6, "text-anchor": "middle" }, xName);
-    make(svg, "text", { x: 12, y: (H - bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(H - bottom) / 2})` }, yName);
-    make(svg, "path", { class: "axis", d: `M${left} ${top}V${H - bottom}H${W - right}` });
-    return { svg, x, y };
-  };
+  const figure = (...of) => makeFigure(byId("figures"), ...of);
   const dot = (plot, star, x, y) => {
     const node = make(plot.svg, "circle", { class: "dot", cx: plot.x(x), cy: plot.y(y), r: 2.2 });
     node.addEventListener("pointerenter", () => tell(star));
@@ -267,3 +257,4 @@
 
   show();
   new ResizeObserver(show).observe(view);
+};

@@ -4,9 +4,10 @@
 //! completeness with the predicted limit.
 
 use super::data::PageData;
-use super::template::{Kind, picture_address, render};
+use super::template::{Kind, picture_address, render, render_view};
+use crate::frame::Frame;
 use crate::pipeline::Solution;
-use crate::report::overlay::{OverlayOptions, Shown, photograph};
+use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
 use crate::report::{FrameReport, TextOptions};
 use minijinja::context;
 use minijinja::value::{Serde, Value};
@@ -14,7 +15,10 @@ use std::io;
 
 const FRAME: Kind = Kind {
     template: "frame.html",
-    script: include_str!("frame.js"),
+    script: concat!(
+        include_str!("frame.js"),
+        "showFrame(document, JSON.parse(document.getElementById(\"data\").textContent));\n"
+    ),
 };
 
 /// The page of a frame; without `shown`, as for a list of centroids, without its picture.
@@ -27,17 +31,75 @@ pub fn html(
     shown: Option<&Shown<'_>>,
     options: &OverlayOptions,
 ) -> io::Result<String> {
-    let background = solution.background.as_ref();
-    let picture = shown.map(|shown| picture_address(&photograph(shown, background, options)));
+    let data = PageData::of(report, solution);
+    let picture = shown.map(|shown| picture(shown, solution, options));
+    let title = shown.map_or(report.frame.as_str(), |shown| shown.title);
+    let values = values(report, title, picture.transpose()?, &data);
+    render(&FRAME, values, &data)
+}
+
+/// What a page with views of its own shows of a frame: elements, and the data of `showFrame` in `frame.js`,
+/// which brings them to life.
+#[doc(hidden)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FrameView {
+    /// The answer, the picture and the table, as elements.
+    pub html: String,
+    /// JSON.
+    pub data: String,
+}
+
+/// The view of a frame on another page.
+///
+/// # Errors
+/// As [`html`].
+#[doc(hidden)]
+pub fn view(
+    report: &FrameReport,
+    solution: &Solution,
+    shown: &Shown<'_>,
+    options: &OverlayOptions,
+) -> io::Result<FrameView> {
+    let data = PageData::of(report, solution);
+    let picture = picture(shown, solution, options)?;
+    let values = values(report, shown.title, Some(picture), &data);
+    Ok(FrameView {
+        html: render_view(&FRAME, values)?,
+        data: serde_json::to_string(&data)?,
+    })
+}
+
+/// A frame in grey, as JPEG of at most `most_px` columns, to look at before it is solved.
+///
+/// # Errors
+/// As [`html`].
+#[doc(hidden)]
+pub fn preview(frame: &Frame<'_>, most_px: usize) -> io::Result<Vec<u8>> {
+    jpeg(&thumbnail(frame, most_px))
+}
+
+fn picture(shown: &Shown<'_>, solution: &Solution, options: &OverlayOptions) -> io::Result<String> {
+    picture_address(&photograph(shown, solution.background.as_ref(), options))
+}
+
+/// What the template takes.
+fn values(
+    report: &FrameReport,
+    title: &str,
+    picture: Option<String>,
+    data: &PageData<'_>,
+) -> Value {
     let notes: Vec<String> = report.notes.iter().map(|note| note.text.clone()).collect();
-    let values = context! {
+    let sky = data.sky.iter();
+    let layers: Vec<[&str; 2]> = sky.map(|layer| [layer.key, layer.title]).collect();
+    context! {
         report => Value::from(Serde(report)),
-        title => shown.map_or(report.frame.as_str(), |shown| shown.title),
+        title,
         notes,
         text => report.to_text(TextOptions::default()),
-        picture => picture.transpose()?,
-    };
-    render(&FRAME, values, &PageData::of(report, solution))
+        picture,
+        layers,
+    }
 }
 
 #[cfg(test)]
@@ -71,6 +133,21 @@ mod tests {
         assert!(page.contains("&lt;script&gt;alert(1)&lt;&#x2f;script&gt;.tif"));
         assert_eq!(page.matches("</script>").count(), 2);
         assert!(is_page(page.as_bytes()));
+    }
+
+    #[test]
+    fn a_view_has_the_answer_and_neither_style_nor_scripts() {
+        let (solution, report) = frame();
+        let pixels = Frame::new(400, 300, vec![0.5; 400 * 300]).unwrap();
+        let shown = Shown::new("a <b>.tif", &pixels);
+        let view = view(&report, &solution, &shown, &OverlayOptions::default()).unwrap();
+        assert!(view.html.contains("Not identified") && view.html.contains("id=\"view\""));
+        assert!(view.html.contains("a &lt;b&gt;.tif"));
+        for mark in ["<script", "<style", "<html", "style=\""] {
+            assert!(!view.html.contains(mark), "{mark}");
+        }
+        let data: serde_json::Value = serde_json::from_str(&view.data).unwrap();
+        assert_eq!(data["width"], 400);
     }
 
     #[test]

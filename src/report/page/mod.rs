@@ -22,6 +22,8 @@ mod template;
 pub use document::{Fact, Page, PageFigure, Thumbnail};
 pub use frame::html;
 #[doc(hidden)]
+pub use frame::{FrameView, preview, view};
+#[doc(hidden)]
 pub use table::PageTable;
 
 use memchr::memmem;

@@ -17,8 +17,10 @@ pub(super) struct Kind {
     pub(super) script: &'static str,
 }
 
-const TEMPLATES: [(&str, &str); 4] = [
+const TEMPLATES: [(&str, &str); 6] = [
     ("base.html", include_str!("base.html")),
+    ("view.html", include_str!("view.html")),
+    ("report.html", include_str!("report.html")),
     ("table.html", include_str!("table.html")),
     ("frame.html", include_str!("frame.html")),
     ("document.html", include_str!("document.html")),
@@ -26,25 +28,36 @@ const TEMPLATES: [(&str, &str); 4] = [
 
 /// The page of `kind` with `values` in its template and `data` for its script.
 pub(super) fn render(kind: &Kind, values: Value, data: &impl Serialize) -> io::Result<String> {
-    let mut environment = Environment::new();
-    for (name, source) in TEMPLATES {
-        environment
-            .add_template(name, source)
-            .map_err(io::Error::other)?;
-    }
     let script = [
         "\"use strict\";\n(() => {\n",
         include_str!("table.js"),
+        include_str!("figure.js"),
         kind.script,
         "})();\n",
     ];
     let values = context! {
+        base => "base.html",
         data => script_data(data)?,
         style => include_str!("page.css"),
         script => script.concat(),
         version => env!("CARGO_PKG_VERSION"),
         ..values
     };
+    fill(kind, values)
+}
+
+/// What is within such a page, for another one that has its style and script already.
+pub(super) fn render_view(kind: &Kind, values: Value) -> io::Result<String> {
+    fill(kind, context! { base => "view.html", ..values })
+}
+
+fn fill(kind: &Kind, values: Value) -> io::Result<String> {
+    let mut environment = Environment::new();
+    for (name, source) in TEMPLATES {
+        environment
+            .add_template(name, source)
+            .map_err(io::Error::other)?;
+    }
     environment
         .get_template(kind.template)
         .and_then(|template| template.render(values))

@@ -3,14 +3,18 @@
 use super::caller::Caller;
 use super::error::DefocusError;
 use super::noise::Noise;
-use super::star::{RadiusPoint, StarModel, StarStudy};
+use super::star::{RadiusPoint, StarModel, StarStudy, default_v_mag};
 use crate::model::defocus::{
-    ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow, Surface,
+    EnergyStudy, ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow,
+    Surface,
 };
+use crate::model::sensitivity::Scenario;
 use rayon::prelude::*;
 
 /// Least number of trials at the noise of the study: the reported radii depend on them.
 const MIN_TRIALS: usize = 1000;
+/// Seed of the random numbers unless another is stated.
+const DEFAULT_SEED: u64 = 1;
 
 /// Stars, radii and noises of a study.
 pub struct Plan {
@@ -31,6 +35,56 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Stars of these magnitudes, or one of [`default_v_mag`], under a camera; errors over radii and noises
+    /// around `noise`.
+    ///
+    /// # Errors
+    /// [`DefocusError::NoLimit`] if a magnitude is to be chosen and there is no limit.
+    pub fn of_camera(
+        scenario: Scenario,
+        noise: Noise,
+        v_mags: &[f64],
+    ) -> Result<Self, DefocusError> {
+        let scenario = noise.replacing_in(scenario);
+        let v_mags = match v_mags {
+            [] => vec![default_v_mag(&scenario)?],
+            given => given.to_vec(),
+        };
+        let star = |v_mag| StarModel::Energy(Box::new(EnergyStudy::new(scenario.clone(), v_mag)));
+        Ok(Self {
+            stars: v_mags.into_iter().map(star).collect(),
+            grid: Grid::around(noise.value()),
+            lens: Some(Lens::of(&scenario.camera, 0.0)),
+            present_px: Some(scenario.camera.spot_sigma_px),
+            noise,
+            required_px: Vec::new(),
+            seed: DEFAULT_SEED,
+        })
+    }
+
+    /// The paper's experiment.
+    pub fn of_paper(noise: Noise) -> Self {
+        Self {
+            stars: vec![StarModel::Peak(PeakStudy::default())],
+            grid: Grid::of_paper(),
+            noise,
+            lens: None,
+            present_px: None,
+            required_px: Vec::new(),
+            seed: DEFAULT_SEED,
+        }
+    }
+
+    /// The same with so many trials at each point of the grid.
+    #[must_use]
+    pub fn with_trials(self, trials: usize) -> Self {
+        let stars = self.stars.iter();
+        Self {
+            stars: stars.map(|star| star.with_trials(trials)).collect(),
+            ..self
+        }
+    }
+
     /// Number of points that are measured: how often [`Self::run`] calls [`Caller::done`].
     pub fn point_count(&self) -> usize {
         self.stars.len() * self.grid.spots_px.len() * (self.grid.noises.len() + 1)

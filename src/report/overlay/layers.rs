@@ -1,0 +1,89 @@
+//! What of the sky is drawn over a frame, layer by layer, for pages that draw it themselves.
+
+use super::canvas::{Canvas, Shape};
+use super::labels::Room;
+use super::picture::Picture;
+use super::sky::Layer;
+use crate::base::format::to_decimals;
+use crate::base::size::Size;
+use crate::identify::Identification;
+use serde::Serialize;
+
+/// A layer, in pixels of the frame.
+#[derive(Debug, Serialize)]
+pub(in crate::report) struct SkyLayer {
+    /// Its name in scripts.
+    pub key: &'static str,
+    /// Its name for people.
+    pub title: &'static str,
+    /// x and y of the points of each line.
+    lines: Vec<Vec<[f64; 2]>>,
+    /// x and y of the centre, and radius.
+    circles: Vec<[f64; 3]>,
+    /// Where the baseline of each text begins.
+    texts: Vec<(String, [f64; 2])>,
+}
+
+/// The layers of an identified frame that have something within it. A name stands where there is room
+/// among the names of its layer.
+pub(in crate::report) fn sky_layers(size: Size, found: &Identification) -> Vec<SkyLayer> {
+    let picture = Picture::empty(size);
+    let unit = picture.stroke_unit();
+    let image = [size.width as f32, size.height as f32];
+    let drawn = |layer: Layer| {
+        let mut canvas = Canvas::new(size, unit);
+        layer.draw(&mut canvas, &picture, found, &mut Room::all(image, unit));
+        SkyLayer::of(layer, canvas)
+    };
+    let layers = Layer::ALL.into_iter().map(drawn);
+    layers.filter(|layer| !layer.is_empty()).collect()
+}
+
+impl SkyLayer {
+    fn of(layer: Layer, canvas: Canvas) -> Self {
+        let (key, title) = names(layer);
+        let mut this = Self {
+            key,
+            title,
+            lines: Vec::new(),
+            circles: Vec::new(),
+            texts: Vec::new(),
+        };
+        for shape in canvas.shapes {
+            match shape {
+                Shape::Line { points, .. } => {
+                    this.lines.push(points.into_iter().map(pixel).collect());
+                }
+                Shape::Circle { center, radius, .. } => {
+                    let [x, y] = pixel(center);
+                    this.circles.push([x, y, rounded(radius)]);
+                }
+                Shape::Text { text, at, .. } => this.texts.push((text, pixel(at))),
+            }
+        }
+        this
+    }
+
+    fn is_empty(&self) -> bool {
+        self.lines.is_empty() && self.circles.is_empty() && self.texts.is_empty()
+    }
+}
+
+fn names(layer: Layer) -> (&'static str, &'static str) {
+    match layer {
+        Layer::Horizon => ("horizon", "horizon"),
+        Layer::EquatorialGrid => ("equatorial", "right ascension and declination"),
+        Layer::HorizontalGrid => ("horizontal", "azimuth and altitude"),
+        Layer::DeepSky => ("deepsky", "clusters and nebulae"),
+        Layer::Constellations => ("constellations", "constellations"),
+    }
+}
+
+/// A position in the picture as a pixel of the frame: (0, 0) is the centre of the first one.
+fn pixel(position: [f32; 2]) -> [f64; 2] {
+    position.map(|along| rounded(along - 0.5))
+}
+
+fn rounded(px: f32) -> f64 {
+    to_decimals(f64::from(px), 1)
+}
