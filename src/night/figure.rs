@@ -251,16 +251,10 @@ impl Plot {
     }
 
     fn draw(&self, out: &mut String, rows: &[NightRow], time: &TimeAxis, top: f64) {
-        const TICKS: usize = 4;
         let [low, high] = self.range(rows);
         let y = |value: f64| top + PLOT * (high - value) / (high - low);
-        let decimals = if high - low > 20.0 {
-            0
-        } else {
-            usize::from(high - low < 1.0) + 1
-        };
-        for tick in 0..=TICKS {
-            let value = low + (high - low) * tick as f64 / TICKS as f64;
+        let (ticks, decimals) = ticks([low, high]);
+        for value in ticks {
             let _ = writeln!(
                 out,
                 "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"10\">{value:.decimals$}</text>\
@@ -299,6 +293,23 @@ impl Plot {
     }
 }
 
+/// Round values between bounds, and the decimals that they need.
+fn ticks([low, high]: [f64; 2]) -> (Vec<f64>, usize) {
+    /// Ticks at most.
+    const MOST: f64 = 5.0;
+    let least = (high - low) / MOST;
+    let exponent = libm::floor(libm::log10(least));
+    let power = libm::pow(10.0, exponent);
+    let step = [1.0, 2.0, 5.0].into_iter().map(|part| part * power);
+    let step = step.into_iter().find(|step| *step >= least);
+    let step = step.unwrap_or(10.0 * power);
+    let decimals = (-libm::floor(libm::log10(step) + 1e-9)).max(0.0) as usize;
+    let first = libm::ceil(low / step);
+    let count = (libm::floor(high / step) - first).max(0.0) as u32;
+    let ticks = (0..=count).map(|tick| (first + f64::from(tick)) * step);
+    (ticks.collect(), decimals)
+}
+
 /// The border and the title of a plot.
 fn frame(out: &mut String, title: &str, top: f64) {
     let _ = writeln!(
@@ -329,7 +340,9 @@ fn keogram_cells() -> Vec<(usize, f64)> {
     let south = rings
         .clone()
         .map(|altitude| (nearest(altitude, 180.0), altitude));
-    let north = rings.map(|altitude| (nearest(altitude, 0.0), 180.0 - altitude));
+    let north = rings
+        .rev()
+        .map(|altitude| (nearest(altitude, 0.0), 180.0 - altitude));
     south.chain(north).collect()
 }
 
@@ -449,6 +462,18 @@ mod tests {
         assert!((azimuth(0) - 180.0).abs() < 4.0);
         assert!(azimuth(35) < 4.0 || azimuth(35) > 356.0);
         assert!(cells.windows(2).all(|pair| pair[0].1 < pair[1].1));
+    }
+
+    #[test]
+    fn ticks_are_round_values() {
+        assert_eq!(
+            ticks([0.0, 100.0]),
+            (vec![0.0, 20.0, 40.0, 60.0, 80.0, 100.0], 0)
+        );
+        let (values, decimals) = ticks([20.49, 21.08]);
+        assert_eq!(decimals, 1);
+        assert_eq!(values.len(), 3);
+        assert!((values[0] - 20.6).abs() < 1e-9 && (values[2] - 21.0).abs() < 1e-9);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //!    identified: by the attitude that the mount and the date give ([`NightRow`]).
 //! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
 //!    frames that agree with each other ([`PointingHistory`]).
-//! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels`]).
+//! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels()`]).
 //! 5. The series tell when something changes ([`Moment`]).
 //!
 //! Caveats: a camera that follows the stars has no pointing in the horizon to hold; its frames are solved

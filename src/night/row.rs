@@ -10,7 +10,7 @@ use crate::base::statistics::{Estimate, median};
 use crate::base::table::{Column, columns};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::Identification;
-use crate::photometry::sky_map::SkyMap;
+use crate::photometry::sky_map::{Place, SkyCell, SkyMap};
 use crate::pipeline::{Outcome, Solution};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -268,9 +268,9 @@ impl NightRow {
         }
         self.dimming_mag =
             clear_ground_vmag.and_then(|clearest| mag(clearest - clear.ground_vmag()));
-        let mut limits: Vec<[f64; 2]> = sky.cells.iter().filter_map(clear_limit).collect();
-        let mut median_of = |part: usize| {
-            let mut values: Vec<f64> = limits.iter_mut().map(|limit| limit[part]).collect();
+        let limits: Vec<[f64; 2]> = sky.cells.iter().filter_map(clear_limit).collect();
+        let median_of = |part: usize| {
+            let mut values: Vec<f64> = limits.iter().map(|limit| limit[part]).collect();
             (!values.is_empty())
                 .then(|| median(&mut values))
                 .and_then(mag)
@@ -290,8 +290,7 @@ fn mag(value: f64) -> Option<f64> {
 }
 
 /// The limit of a clear cell that is not low, and its difference from the expected one.
-fn clear_limit(cell: &crate::photometry::sky_map::SkyCell) -> Option<[f64; 2]> {
-    use crate::photometry::sky_map::Place;
+fn clear_limit(cell: &SkyCell) -> Option<[f64; 2]> {
     const CLEAR: f64 = 0.9;
     const LOW_DEG: f64 = 30.0;
     let is_low =

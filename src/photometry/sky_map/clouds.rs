@@ -42,8 +42,11 @@ pub(super) struct CellClouds {
 impl Sky<'_> {
     /// Clouds in each cell.
     pub(super) fn clouds(&self, witnesses: &[Witness]) -> Vec<CellClouds> {
-        let limit = RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance);
-        let limit = limit.or_else(|| self.is_usual.then(RelativeLimit::usual));
+        let limit = if self.is_usual {
+            Some(RelativeLimit::usual())
+        } else {
+            RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance)
+        };
         let logs: Vec<[f64; STEPS]> = witnesses
             .iter()
             .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
