@@ -24,6 +24,12 @@ extern "C" {
     fn progress(stage: &str, share: f64);
 }
 
+/// Lets panics be remembered, and not printed.
+#[wasm_bindgen(start)]
+fn start() {
+    starpipe::base::panics::silence();
+}
+
 /// What the latest panic said. A panic ends the module: nothing else may be called after it.
 #[wasm_bindgen]
 pub fn latest_panic() -> Option<String> {

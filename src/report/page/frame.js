@@ -77,14 +77,16 @@ const showFrame = (root, data) => {
   const placeNames = (u) => {
     const MOST = 60, SIZE = 12;
     layers.names.replaceChildren();
-    const taken = [];
+    const roomOf = (x, y, text) => [x, y - SIZE * u, x + text.length * SIZE * 0.6 * u, y + 3 * u];
+    const skyNames = [...skyTexts].filter((node) => node.parentNode.style.display !== "none");
+    const taken = skyNames.map((node) => roomOf(Number(node.getAttribute("x")), Number(node.getAttribute("y")), node.textContent));
     const shown = byMagnitude.filter((s) => s.x > box.x && s.x < box.x + box.w && s.y > box.y && s.y < box.y + box.h);
     const named = shown.filter((star) => star.name);
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
-      if (taken.length >= MOST) break;
+      if (taken.length >= MOST + skyNames.length) break;
       const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
       const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
-      const room = [at[0], at[1] - SIZE * u, at[0] + text.length * SIZE * 0.6 * u, at[1] + 3 * u];
+      const room = roomOf(...at, text);
       if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
       taken.push(room);
       make(layers.names, "text", { x: at[0], y: at[1], "font-size": SIZE * u, "stroke-width": 3 * u }, text);
@@ -154,7 +156,10 @@ const showFrame = (root, data) => {
   for (const input of root.querySelectorAll("[data-layer]")) {
     const layer = layers[input.dataset.layer] || byId("picture");
     if (input.dataset.layer === "unidentified" && !stars.some((star) => star.id)) input.checked = true;
-    const apply = () => { if (layer) layer.style.display = input.checked ? "" : "none"; };
+    const apply = () => {
+      if (layer) layer.style.display = input.checked ? "" : "none";
+      show();
+    };
     input.addEventListener("change", apply);
     apply();
   }
