@@ -31,6 +31,7 @@ quantum_efficiency = 0.7
 band_from_nm = 400
 band_to_nm = 800
 read_noise_e = 5
+dark_current_e_s = 0.1
 full_well_e = 60000
 gain_e_per_adu = 1
 bits = 16
