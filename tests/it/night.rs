@@ -50,7 +50,7 @@ fn date(number: usize) -> ObservationDate {
 /// 3° from the zenith, image-up to the north, and the image seen from below.
 fn pointing(number: usize) -> Rotation<Horizon, Camera> {
     // East on the left, south below.
-    let up = Rotation::from_quaternion([0.0, 0.0, 1.0, 0.0]);
+    let up = Rotation::from_quaternion([0.0, 0.0, 0.0, 1.0]);
     let tilted = up.then_turn(Vector3::new(3_f64.to_radians(), 0.0, 0.0));
     let knock_rad = if number < KNOCKED {
         0.0
@@ -162,7 +162,7 @@ fn a_night_tells_clouds_and_the_knock_and_goes_on_where_it_stopped() {
     for (number, row) in rows.iter().enumerate() {
         let is_clouded = CLOUDED.contains(&number);
         let cloud_share = row["cloud_share"].as_f64().unwrap();
-        assert_eq!(cloud_share > 0.8, is_clouded, "{number}: {cloud_share}");
+        assert_eq!(cloud_share > 0.3, is_clouded, "{number}: {cloud_share}");
         let zenith = row["zenith_mag_arcsec2"].as_f64().unwrap();
         assert!((19.8..20.8).contains(&zenith), "{number}: {zenith}");
         if row["pointing"] == "held" {
