@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Least change of the share of the sky that is behind clouds,
-const LEAST_CLOUDS: f64 = 0.03;
+const LEAST_CLOUDS: f64 = 0.1;
 /// of the spot, as a part of it,
 const LEAST_WIDENING: f64 = 0.05;
 /// and of the stars' brightness, in magnitudes.
