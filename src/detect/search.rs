@@ -279,7 +279,7 @@ impl FrameSearch {
                 Some(NoiseTail::Correlated) => MAX_RAISE * threshold,
                 Some(NoiseTail::Coarse) => MAX_RAISE_OF_COARSE * threshold,
             };
-            extrema.prepare(size);
+            extrema.prepare(size, mesh);
             filtered.for_sampled_rows(view, mesh, &kernel, |rows, y, filtered_mesh| {
                 extrema.add_row(rows, y, filtered_mesh);
             })?;

@@ -226,8 +226,11 @@ impl Mesh {
         [cell - step, cell, cell + step].map(|at| self.background[at])
     }
 
-    /// Whether the background bends near a place by more than `sigmas` times the noise of a pixel.
-    pub fn is_bent_at(&self, x: f32, y: f32, sigmas: f32) -> bool {
+    /// Whether the background bends near a place more than that of a sky.
+    pub fn is_bent_at(&self, x: f32, y: f32) -> bool {
+        /// The bend of an edge, in noises of a pixel. The background that bends by less moves stars by less than
+        /// a tenth of a standard error.
+        const SIGMAS: f32 = 3.0;
         let CellGrid { columns, rows, .. } = self.grid;
         let at = self.grid.cell_at(
             (x.max(0.0) as usize).min(self.grid.width_px - 1),
@@ -236,7 +239,7 @@ impl Mesh {
         let inner = |at: usize, count: usize| at.max(2) - 1..(at + 2).min(count.saturating_sub(1));
         let (row, column) = (at / columns, at % columns);
         let bends =
-            |cell: usize, step: usize| bend(self.around(cell, step)) > sigmas * self.sigma[cell];
+            |cell: usize, step: usize| bend(self.around(cell, step)) > SIGMAS * self.sigma[cell];
         let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         near(row, rows).any(|y| inner(column, columns).any(|x| bends(y * columns + x, 1)))
             || inner(row, rows)

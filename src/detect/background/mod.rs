@@ -27,5 +27,6 @@ pub(crate) use censored_noise::{CensoredNoise, MAX_DEPTH};
 pub(crate) use clipping::DIFFERENCE_PX;
 pub(crate) use cut_off::{CutOff, REACH_SIGMA};
 pub(crate) use frame_background::{FrameBackground, median, rounding_sigma_adu, sigma_floor};
+pub(crate) use grid::CellGrid;
 pub(crate) use mesh::{Mesh, Piece};
 pub(crate) use mesh_config::MeshConfig;

@@ -20,11 +20,9 @@ impl BackgroundPlane {
     /// The background in `window`: that of the map, or of the pixels around it where the map does not
     /// follow an edge, as of the circle of an all-sky lens: its error would draw faint stars along.
     pub fn in_window(view: &View<'_>, map: &Mesh, window: &Window) -> Self {
-        /// A map that bends by less is off by less than a tenth of a standard error of positions.
-        const BENT_SIGMAS: f32 = 3.0;
         let of_map = Self::of_map(map, window);
         let [x, y] = [window.x0 + window.width / 2, window.y0 + window.height / 2];
-        if map.is_bent_at(x as f32, y as f32, BENT_SIGMAS) {
+        if map.is_bent_at(x as f32, y as f32) {
             of_map.through_ring(view, window).unwrap_or(of_map)
         } else {
             of_map

@@ -8,10 +8,11 @@
 //! side has above the threshold, on the assumption that their number falls as one over their flux.
 //!
 //! Foliage and roofs have tails of their own: the frame is divided into parts, and the median of
-//! the parts' thresholds holds.
+//! the parts' thresholds holds. Where the background bends, as at the circle of an all-sky frame, nothing is
+//! measured: on both sides of an edge the filtered frame is far off.
 
 use crate::base::size::Size;
-use crate::detect::background::Mesh;
+use crate::detect::background::{CellGrid, Mesh};
 use crate::detect::pixels::{BLOCK_PX, Widened, packed, with_widened};
 use multiversion::multiversion;
 
@@ -38,6 +39,9 @@ pub(crate) struct Extrema {
     /// Parts across, and down.
     parts: usize,
     heights: Vec<Sides>,
+    grid: CellGrid,
+    /// By cell, whether the background bends there.
+    is_bent: Vec<bool>,
     /// The mesh interpolated to a row.
     nodes: Vec<[f32; 2]>,
     /// A row in standard deviations.
@@ -56,8 +60,17 @@ struct Sides {
 }
 
 impl Extrema {
-    /// Clears what was measured, for a frame of this size.
-    pub fn prepare(&mut self, size: Size) {
+    /// Clears what was measured, for a frame of this size with this background.
+    pub fn prepare(&mut self, size: Size, background: &Mesh) {
+        let grid = background.grid;
+        self.grid = grid;
+        self.is_bent.clear();
+        for row in 0..grid.rows {
+            let y = grid.rows_of(row).start as f32;
+            let of_row = (0..grid.columns).map(|column| grid.columns_of(column).start as f32);
+            let is_bent = of_row.map(|x| background.is_bent_at(x, y));
+            self.is_bent.extend(is_bent);
+        }
         let most = ((size.pixels() / MIN_PART_PX) as f64).sqrt() as usize;
         let parts = most.clamp(1, MAX_PARTS);
         self.size = size;
@@ -75,8 +88,12 @@ impl Extrema {
     pub fn add_row(&mut self, rows: [&[f32]; 3], y: usize, mesh: &Mesh) {
         let Size { width, height } = self.size;
         let first_part = y * self.parts / height * self.parts;
-        for sides in &mut self.heights[first_part..first_part + self.parts] {
-            sides.pixels += width / self.parts;
+        let first_cell = self.grid.cell_at(0, y);
+        let is_bent = &self.is_bent[first_cell..first_cell + self.grid.columns];
+        for (column, _) in is_bent.iter().enumerate().filter(|(_, is_bent)| !**is_bent) {
+            let pixels = self.grid.columns_of(column);
+            let part = first_part + pixels.start * self.parts / width;
+            self.heights[part].pixels += pixels.len();
         }
         mesh.across_row(y, &mut self.nodes);
         self.row.resize(width, 0.0);
@@ -88,6 +105,9 @@ impl Extrema {
                 while bits != 0 {
                     let x = first + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
+                    if self.is_bent[self.grid.cell_at(x, y)] {
+                        continue;
+                    }
                     let sides = &mut self.heights[first_part + x * self.parts / width];
                     let (height, heights) = if is_above {
                         (self.row[x], &mut sides.positive)
