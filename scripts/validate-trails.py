@@ -120,7 +120,7 @@ def main():
     parser.add_argument("--frames", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    cells = {(h, l): [0, 0] for h in HEIGHTS[:-1] for l in LENGTHS[:-1]}
+    cells = {(height, length): [0, 0] for height in HEIGHTS[:-1] for length in LENGTHS[:-1]}
     false, false_without, offs, ends_off, fluxes, stars, lost = 0, 0, [], [], [], 0, 0
     left_out = 0
     with tempfile.TemporaryDirectory() as name:
@@ -143,8 +143,8 @@ def main():
             trails = truth(directory / f"with-{number:03}.csv", vmag, clean)
             for true in trails:
                 matches = [found for found in seen["trails"] if is_same(true, found)]
-                height = max((h for h in HEIGHTS[:-1] if h <= true["height"]), default=None)
-                length = max(l for l in LENGTHS[:-1] if l <= math.dist(*true["ends"]))
+                height = max((least for least in HEIGHTS[:-1] if least <= true["height"]), default=None)
+                length = max(least for least in LENGTHS[:-1] if least <= math.dist(*true["ends"]))
                 if height is not None:
                     cells[height, length][0] += 1
                     cells[height, length][1] += bool(matches)
