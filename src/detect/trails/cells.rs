@@ -67,16 +67,18 @@ impl CellMap {
         for y in 0..self.rows * self.side_px {
             search.view.row(y).copy_to(&mut pixels);
             search.mesh.row_pieces(y, &mut pieces);
-            let first = y / self.side_px * self.columns;
             for piece in &pieces {
-                let end = piece.end.min(self.columns * self.side_px);
-                for (from_start, &pixel) in pixels[piece.start.min(end)..end].iter().enumerate() {
-                    let cell = first + (piece.start + from_start) / self.side_px;
-                    let right = from_start as f32;
+                for (right, pixel) in pixels[piece.start..piece.end].iter_mut().enumerate() {
+                    let right = right as f32;
                     let background = piece.background + right * piece.background_slope;
                     let inverse_sigma = piece.inverse_sigma + right * piece.inverse_sigma_slope;
-                    self.values[cell] += (pixel - background) * inverse_sigma;
+                    *pixel = (*pixel - background) * inverse_sigma;
                 }
+            }
+            let first = y / self.side_px * self.columns;
+            let cells = pixels.chunks_exact(self.side_px);
+            for (value, cell) in self.values[first..][..self.columns].iter_mut().zip(cells) {
+                *value += cell.iter().sum::<f32>();
             }
         }
         for (value, is_free) in self.values.iter_mut().zip(&mut self.is_free) {

@@ -17,7 +17,8 @@
 //!
 //! Caveats: trails along a row or a column to within a pixel are taken for noise of the detector; curved trails are found in pieces, or not at all. A trail through the centre of a saturated
 //! star that is near the trail's middle or one of its ends is taken for a spike. Trails shorter than 16
-//! cells are detections with the flag `trail` only. Frames whose stars are trails are not searched.
+//! cells are detections with the flag `trail` only. Of two that are closer than some 10 cells side by side, one may be lost. Frames
+//! whose stars are trails are not searched.
 //!
 //! # Reference
 //! Nir, Zackay & Ofek 2018, AJ 156, 229, section 2 (streaks by the fast Radon transform); Götz &

@@ -141,8 +141,24 @@ fn strongest_in_strips(
     found
 }
 
+/// The largest of some values, in lanes that are compared at once.
+fn largest(values: &[f32]) -> f32 {
+    const LANES: usize = 16;
+    let more = |a: f32, b: f32| if a > b { a } else { b };
+    let mut lanes = [f32::NEG_INFINITY; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    for chunk in chunks {
+        for (lane, &value) in lanes.iter_mut().zip(chunk) {
+            *lane = more(*lane, value);
+        }
+    }
+    lanes
+        .into_iter()
+        .chain(rest.iter().copied())
+        .fold(f32::NEG_INFINITY, more)
+}
+
 fn strongest_of(strip: usize, sums: &[f32], [width, rows]: [usize; 2]) -> StripLine {
-    let largest = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let mut strongest = (f32::NEG_INFINITY, 0);
     for (right, row) in sums.chunks_exact(width).enumerate() {
         let sum = largest(row);
