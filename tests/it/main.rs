@@ -48,5 +48,4 @@ mod spots;
 mod terminal;
 mod tiles;
 mod track;
-mod trails;
 mod validate;

@@ -48,18 +48,6 @@ impl CellMap {
         map
     }
 
-    /// A square map of these values, without stars.
-    #[cfg(test)]
-    pub fn of_values(side: usize, values: Vec<f32>) -> Self {
-        Self {
-            side_px: 1,
-            columns: side,
-            rows: side,
-            is_free: vec![true; values.len()],
-            values,
-        }
-    }
-
     /// Adds up the pixels above the background; cells without a part of them are not free.
     fn add_light(&mut self, search: &TrailSearch<'_>) {
         let mut pieces: Vec<Piece> = Vec::new();
