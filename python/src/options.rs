@@ -36,6 +36,7 @@ pub struct Options {
     refine_lens: bool,
     attitude_only: bool,
     sky: bool,
+    trails: bool,
     time_limit_s: Option<f64>,
 }
 
@@ -67,6 +68,7 @@ impl Options {
         options.refine_lens = self.refine_lens;
         options.attitude_only = self.attitude_only;
         options.sky = self.sky;
+        options.trails = self.trails;
         options.time_limit_s = self.time_limit_s;
         if let Some(false_alarms) = self.false_alarms_per_mpx {
             options.false_alarms_per_mpx = false_alarms;

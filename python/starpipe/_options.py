@@ -84,6 +84,8 @@ class SolveOptions(TypedDict, total=False):
         Stop at the attitude: no star beyond the brightest is named.
     sky : bool
         Measure the sky at each place: `Result.sky_map`.
+    trails : bool
+        Search satellites, aeroplanes and meteors: `Result.trails`.
     time_limit : Quantity or float
         How long a frame may take, in seconds. By default as long as it needs.
     """
@@ -110,6 +112,7 @@ class SolveOptions(TypedDict, total=False):
     refine_lens: bool
     attitude_only: bool
     sky: bool
+    trails: bool
     time_limit: Quantity | float | None
 
 
@@ -138,6 +141,7 @@ def solve_options(
     refine_lens: bool = False,
     attitude_only: bool = False,
     sky: bool = False,
+    trails: bool = False,
     time_limit: Any = None,
 ) -> dict[str, Any]:
     """Return what the compiled part takes; a header completes what is not known."""
@@ -169,6 +173,7 @@ def solve_options(
         "refine_lens": bool(refine_lens),
         "attitude_only": bool(attitude_only),
         "sky": bool(sky),
+        "trails": bool(trails),
         "time_limit_s": positive(time_limit, "s", "time_limit"),
     }
 

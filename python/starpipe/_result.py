@@ -225,6 +225,11 @@ class Result(Attitude):
         return self._report.get("sky")
 
     @property
+    def trails(self) -> list[dict[str, Any]] | None:
+        """Satellites, aeroplanes and meteors, with ``trails=True``: the `trails` of the JSON."""
+        return self._report.get("trails")
+
+    @property
     def timing(self) -> dict[str, float]:
         """Run time of each stage, in milliseconds."""
         return self._report["timing_ms"]  # type: ignore[no-any-return]

@@ -139,6 +139,11 @@ def test_attitude_only_names_few(pipeline, pixels, result):
     assert 4 <= named[0] <= named[1]
 
 
+def test_trails_are_searched_on_demand(pipeline, pixels, result):
+    assert result.trails is None
+    assert pipeline.solve(pixels, trails=True).trails == []
+
+
 def test_the_sky_is_measured_on_demand(pipeline, pixels, result):
     assert result.sky_map is None
     sky = pipeline.solve(pixels, sky=True).sky_map

@@ -19,6 +19,9 @@
 //!    grey-weighted centroid; flags for non-stellar and truncated sources.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
 //!
+//! `trails` searches what is left for satellites, aeroplanes and meteors
+//! ([`Workspace::find_trails`]).
+//!
 //! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.
 //! Steps 1 to 3 process the pixels in rows of cells, each by itself, so that threads can share them
 //! ([`Workspace::on_threads`]) and the filtered frame is never in memory as a whole.
@@ -54,6 +57,7 @@ mod star_model;
 mod threads;
 mod threshold;
 mod trailed;
+mod trails;
 #[doc(hidden)]
 pub mod windows;
 mod wings;
@@ -70,6 +74,7 @@ pub use filter_model::FilterModel;
 #[doc(hidden)]
 pub use sky_area::Circle;
 pub use sky_area::SkyArea;
+pub use trails::Trail;
 pub use workspace::Workspace;
 
 use crate::frame::{Frame, MIN_SIDE_PX};

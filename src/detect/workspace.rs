@@ -3,10 +3,13 @@
 use super::background::FrameBackground;
 use super::detection::Detections;
 use super::measure::MeasureBuffers;
+use super::pixels::View;
+use super::psf::PIXEL_VARIANCE_PX2;
 use super::search::FrameSearch;
 use super::sky_area::SkyArea;
+use super::trails::{Trail, TrailSearch};
 use crate::base::interrupt::Interrupt;
-use crate::frame::{Frame, MemoryLimit, Pixels, SaturationFinder};
+use crate::frame::{Frame, MIN_SIDE_PX, MemoryLimit, Pixels, SaturationFinder};
 use std::num::NonZeroUsize;
 
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
@@ -89,6 +92,27 @@ impl Workspace {
         let stars = found.sources.iter();
         let stars = stars.filter(|source| source.flags.is_star_like());
         SkyArea::of_picture(frame, stars.map(|star| star.position), self.saturation_adu)
+    }
+
+    /// Lines of light that are no stars: satellites, aeroplanes and meteors, the most significant first.
+    /// `frame` is the one that was searched last, and `found` what was found in it. A frame whose
+    /// stars are trails is not searched.
+    pub fn find_trails(&self, frame: &Frame, found: &Detections) -> Vec<Trail> {
+        let view = View::of_live_pixels(frame).until(&self.interrupt);
+        let is_empty = view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX;
+        if is_empty || found.trails.is_some() {
+            return Vec::new();
+        }
+        let widest_px = found
+            .psf
+            .map_or(found.spot_sigma_px, |psf| psf.sigma_range_px[1]);
+        let search = TrailSearch {
+            view: &view,
+            mesh: &self.background.mesh,
+            found,
+            spot_px: (widest_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt(),
+        };
+        search.run()
     }
 
     /// Whether so many bytes fit its memory beside `frame`.

@@ -35,6 +35,7 @@ pub struct NightRow {
     pub shift_arcmin: Option<f64>,
     pub pixel_scale_arcsec: Option<f64>,
     pub detected: Option<u64>,
+    pub trails: Option<u64>,
     pub matched: Option<u64>,
     pub spot_sigma_px: Option<f64>,
     pub limit_vmag: Option<f64>,
@@ -91,6 +92,7 @@ impl NightRow {
             shift_arcmin, "arcmin", "pos.angDistance", "Angle by which the camera differs from how it is held";
             pixel_scale_arcsec, "arcsec", "instr.pixel", "Angle of a pixel on the axis";
             detected, "", "meta.number", "Detections";
+            trails, "", "meta.number", "Trails of satellites, aeroplanes and meteors";
             matched, "", "meta.number", "Identified stars";
             spot_sigma_px, "pix", "instr.det.psf", "Standard deviation of a star's spot";
             limit_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
@@ -125,6 +127,7 @@ impl NightRow {
             frame: frame.to_owned(),
             status: IDENTIFIED.to_owned(),
             detected: Some(solution.sources.len() as u64),
+            trails: solution.trails.as_ref().map(|trails| trails.len() as u64),
             spot_sigma_px: solution.spot_sigma_px.and_then(|px| finite(px, 4)),
             ..Self::default()
         };

@@ -252,6 +252,7 @@ pub fn solve_centroids(
         bodies,
         photometry: None,
         sky: None,
+        trails: None,
         comparison: None,
         gain_e_per_adu: None,
         calibration: None,

@@ -47,6 +47,8 @@ pub struct Context<'a> {
     pub attitude_only: bool,
     /// Whether to measure the sky at each place.
     pub measure_sky: bool,
+    /// Whether to search satellites, aeroplanes and meteors.
+    pub find_trails: bool,
     /// Which directions reported attitudes refer to.
     pub attitude_frame: AttitudeFrame,
     /// A star is named where the odds are at least this many to 1 that the name is right, and at least
@@ -78,6 +80,7 @@ impl<'a> Context<'a> {
             calibration: None,
             attitude_only: false,
             measure_sky: false,
+            find_trails: false,
             attitude_frame: AttitudeFrame::default(),
             name_odds: NAME_ODDS,
             effort: Effort::Normal,

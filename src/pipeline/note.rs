@@ -5,11 +5,12 @@ use super::bright_stars::MissingStar;
 use super::left_out::LeftOut;
 use super::outcome::Outcome;
 use super::raw_color::RawColor;
+use crate::base::format::counted;
 use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::camera::KnownLens;
-use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Wings};
+use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Trail, Wings};
 use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
@@ -103,6 +104,8 @@ pub enum Note {
     Spots(MeasuredPsf),
     /// The stars are trails, and each position is that of the middle of one.
     StarTrails(StarTrails),
+    /// Lines of light that are no stars.
+    Trails(Vec<Trail>),
     /// The stars have light beyond the spots that are fitted to them.
     Wings(Wings),
     /// Every star occurs twice.
@@ -155,6 +158,7 @@ impl Note {
             Self::FalseDetections(_) => "false_detections",
             Self::Spots(_) => "spots_not_round",
             Self::StarTrails(_) => "star_trails",
+            Self::Trails(_) => "trails",
             Self::Wings(_) => "wings",
             Self::DoubleImage(_) => "double_image",
             Self::BodyInFrame(_) => "body_in_frame",
@@ -289,6 +293,12 @@ impl Note {
         }
     }
 
+    /// Satellites, aeroplanes and meteors, where there are any.
+    pub(super) fn of_trails(trails: Option<&[Trail]>) -> Option<Self> {
+        let trails = trails.filter(|trails| !trails.is_empty())?;
+        Some(Self::Trails(trails.to_vec()))
+    }
+
     /// The Moon and the planets in the frame that may be seen in it.
     pub(super) fn of_bodies(
         bodies: &[BodyInFrame],
@@ -399,6 +409,7 @@ impl fmt::Display for Note {
             Self::Spots(psf) => write_spots(f, psf),
             Self::Wings(wings) => write_wings(f, wings),
             Self::StarTrails(trails) => write_trails(f, trails),
+            Self::Trails(trails) => write_lines(f, trails),
             Self::DoubleImage(double) => write!(
                 f,
                 "every star is there twice: {double}; fluxes, zero point and limit are those of one of the \
@@ -484,6 +495,19 @@ fn write_wings(f: &mut fmt::Formatter<'_>, wings: &Wings) -> fmt::Result {
         100.0 * wings.share,
         100.0 * wings.sigma
     )
+}
+
+fn write_lines(f: &mut fmt::Formatter<'_>, trails: &[Trail]) -> fmt::Result {
+    let place = |trail: &Trail| {
+        let [begin, end] = [trail.begin, trail.end];
+        format!(
+            "({:.1}, {:.1}) to ({:.1}, {:.1})",
+            begin.x, begin.y, end.x, end.y
+        )
+    };
+    let list = listed(trails.iter().map(place));
+    let count = counted(trails.len(), "trail");
+    write!(f, "{count} of satellites, aeroplanes or meteors: {list}")
 }
 
 fn write_trails(f: &mut fmt::Formatter<'_>, trails: &StarTrails) -> fmt::Result {

@@ -79,6 +79,8 @@ pub struct SolveOptions {
     pub attitude_only: bool,
     /// Whether to measure the sky at each place: brightness, extinction, clouds and limits.
     pub sky: bool,
+    /// Whether to search the trails of satellites, aeroplanes and meteors.
+    pub trails: bool,
     /// How long a frame may take.
     pub time_limit_s: Option<f64>,
 }
@@ -164,6 +166,7 @@ impl Default for SolveOptions {
             refine_lens: false,
             attitude_only: false,
             sky: false,
+            trails: false,
             time_limit_s: Some(DEFAULT_TIME_LIMIT_S),
         }
     }
@@ -206,6 +209,7 @@ impl<'a> Context<'a> {
             effort: options.effort,
             attitude_only: options.attitude_only,
             measure_sky: options.sky,
+            find_trails: options.trails,
             attitude_frame: options.attitude_frame,
             // A limit that is longer than any clock runs is none.
             time_limit: limit_s.and_then(|limit_s| Duration::try_from_secs_f64(limit_s).ok()),

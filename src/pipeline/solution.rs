@@ -6,7 +6,7 @@ use super::outcome::Outcome;
 use super::stopwatch::Timing;
 use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
-use crate::detect::{Detection, DetectionFlags};
+use crate::detect::{Detection, DetectionFlags, Trail};
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
 use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
@@ -52,6 +52,8 @@ pub struct Solution {
     pub outcome: Outcome,
     /// The Moon and the planets in an identified frame whose date is known.
     pub bodies: Vec<BodyInFrame>,
+    /// Satellites, aeroplanes and meteors, the most significant first; `None` where they were not searched.
+    pub trails: Option<Vec<Trail>>,
     /// Zero point and limiting magnitude of an identified frame; a list of centroids has none.
     pub photometry: Option<FramePhotometry>,
     /// The sky at each place of an identified frame, where it was wanted.

@@ -14,7 +14,7 @@ use super::star_field::star_field;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectConfig, DetectError, Detections};
+use crate::detect::{self, DetectConfig, DetectError, Detections, Trail};
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
 use crate::sky::places::StarPlaces;
@@ -230,8 +230,7 @@ fn solve(
     let double_image = if context.attitude_only {
         None
     } else {
-        let field = star_field(frame, &detections, places);
-        double_image(&mut outcome, &field)
+        double_image(&mut outcome, &star_field(frame, &detections, places))
     };
     clock.lap(Stage::Identify);
 
@@ -243,6 +242,7 @@ fn solve(
         observation: observation(&outcome, &priors),
         priors,
         places,
+        trails: stage.trails(&detections, &mut clock),
         detections,
         sources,
         outcome,
@@ -287,6 +287,15 @@ struct FoundStars {
 }
 
 impl StarSearch<'_, '_> {
+    /// Lines of light beside the stars, where they are wanted.
+    fn trails(&self, detections: &Detections, clock: &mut Stopwatch) -> Option<Vec<Trail>> {
+        let search = &self.workspace.detect;
+        let found = |()| search.find_trails(self.prepared.frame(), detections);
+        let trails = self.context.find_trails.then_some(()).map(found);
+        clock.lap(Stage::Detect);
+        trails
+    }
+
     /// Detects the stars and identifies them; `None` if detection was not done in time.
     fn run(
         &mut self,
@@ -372,6 +381,7 @@ fn not_in_time(
         attitude_frame: context.attitude_frame,
         outcome: Outcome::NotIdentified(Reason::Search(SearchFailure::Interrupted)),
         bodies: Vec::new(),
+        trails: None,
         photometry: None,
         sky: None,
         comparison: None,

@@ -11,7 +11,7 @@ use super::stopwatch::Timing;
 use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
-use crate::detect::{Detections, SkyArea};
+use crate::detect::{Detections, SkyArea, Trail};
 use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
@@ -38,6 +38,8 @@ pub(super) struct SolvedFrame<'a> {
     pub sources: Vec<Source>,
     pub outcome: Outcome,
     pub bodies: Vec<BodyInFrame>,
+    /// Satellites, aeroplanes and meteors, where they were searched.
+    pub trails: Option<Vec<Trail>>,
     /// The second image of every star.
     pub double_image: Option<DoubleImage>,
     /// The scale that was dropped because nothing matched with it.
@@ -194,6 +196,7 @@ impl SolvedFrame<'_> {
             attitude_frame: self.context.attitude_frame,
             outcome: self.outcome,
             bodies: self.bodies,
+            trails: self.trails,
             photometry: self.photometry,
             sky: self.sky,
             comparison,
@@ -225,6 +228,7 @@ impl SolvedFrame<'_> {
             .chain(self.detections.noise_tail.map(Note::FalseDetections))
             .chain(self.detections.psf.map(Note::Spots))
             .chain(self.detections.trails.map(Note::StarTrails))
+            .chain(Note::of_trails(self.trails.as_deref()))
             .chain(self.detections.wings.map(Note::Wings))
             .chain(self.double_image.map(Note::DoubleImage))
             .chain(Note::of_bodies(

@@ -12,7 +12,7 @@ use super::frame_report::{
 };
 use super::sky::SkyReport;
 use super::stars::{self, ReportedPointing};
-use super::{bodies, reason};
+use super::{bodies, reason, trails};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
@@ -79,6 +79,7 @@ impl FrameReport {
             calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
             bodies: Vec::new(),
+            trails: trails::reports(solution),
             stars: solution.sources.iter().map(stars::detection).collect(),
             timing_ms: timing(&solution.timing),
         };

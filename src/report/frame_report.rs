@@ -68,6 +68,9 @@ pub struct FrameReport {
     pub background: BackgroundReport,
     /// The Moon and the planets in the frame, where its date is known.
     pub bodies: Vec<BodyReport>,
+    /// Satellites, aeroplanes and meteors, where they were searched.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trails: Option<Vec<TrailReport>>,
     /// Every detection, brightest first.
     pub stars: Vec<StarReport>,
     /// Run times.
@@ -404,6 +407,55 @@ pub struct BodyReport {
     pub radius_px: f64,
     /// Index of its detection in `stars`, counted from 0.
     pub detection: Option<usize>,
+}
+
+/// A satellite, an aeroplane or a meteor. Without a direction, the begin is the end with the smaller x.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrailReport {
+    /// Position of the begin to the right, in pixels.
+    pub x_begin: f64,
+    /// Position of the begin downward, in pixels.
+    pub y_begin: f64,
+    /// Position of the end to the right, in pixels.
+    pub x_end: f64,
+    /// Position of the end downward, in pixels.
+    pub y_end: f64,
+    /// Standard error of the line's place across it, in pixels.
+    pub sigma_across_px: f64,
+    /// Distance of the ends, in pixels.
+    pub length_px: f64,
+    /// Full width across at half maximum, in pixels.
+    pub width_px: f64,
+    /// Flux above the background, in the frame's own units.
+    pub flux: f64,
+    /// Mean flux of a pixel of length.
+    pub flux_per_px: f64,
+    /// That over its standard error.
+    pub snr: f64,
+    /// Decimal logarithm of the expected number of such lines in a frame of noise.
+    pub log10_false_alarm: f64,
+    /// V magnitude of a star that gives the same light in this exposure.
+    pub vmag: Option<f64>,
+    /// V magnitude of the light of one arcsecond of length.
+    pub vmag_per_arcsec: Option<f64>,
+    /// Angle between the ends, in degrees.
+    pub length_deg: Option<f64>,
+    /// Astrometric right ascension (ICRS) of the begin, in degrees.
+    pub ra_begin_deg: Option<f64>,
+    /// Its declination, in degrees.
+    pub dec_begin_deg: Option<f64>,
+    /// Astrometric right ascension (ICRS) of the end, in degrees.
+    pub ra_end_deg: Option<f64>,
+    /// Its declination, in degrees.
+    pub dec_end_deg: Option<f64>,
+    /// Apparent altitude of the begin, in degrees, where site and time are known.
+    pub altitude_begin_deg: Option<f64>,
+    /// Its azimuth from north through east, in degrees.
+    pub azimuth_begin_deg: Option<f64>,
+    /// Apparent altitude of the end, in degrees, where site and time are known.
+    pub altitude_end_deg: Option<f64>,
+    /// Its azimuth from north through east, in degrees.
+    pub azimuth_end_deg: Option<f64>,
 }
 
 /// One detection and its star.

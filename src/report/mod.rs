@@ -35,6 +35,7 @@ pub mod tables;
 mod tests;
 mod text;
 mod track;
+mod trails;
 pub mod wcs;
 
 #[doc(hidden)]
@@ -42,7 +43,7 @@ pub use frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
     CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,
     ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SiteReport, StarReport,
-    Status, TimingReport,
+    Status, TimingReport, TrailReport,
 };
 pub use frame_report::{FrameReport, SCHEMA};
 pub use lens::LensReport;

@@ -26,6 +26,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         attitude_frame: AttitudeFrame::default(),
         outcome,
         bodies: Vec::new(),
+        trails: None,
         timing: Timing::default(),
     }
 }

@@ -69,6 +69,7 @@ fn unidentified() -> FrameReport {
             sky_share: Some(0.8125),
         },
         bodies: Vec::new(),
+        trails: None,
         stars: vec![StarReport {
             ra_deg: None,
             dec_deg: None,

@@ -112,6 +112,7 @@ impl NightArgs {
         let camera = self.hints.description()?;
         let mut options: SolveOptions = self.hints.options()?;
         options.sky = true;
+        options.trails = true;
         options.exposure_s = self.exposure;
         options.time_limit_s = Some(self.time_limit_s);
         Ok(Plan {

@@ -89,6 +89,9 @@ pub(super) struct DetectionOptions {
     #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u64).range(4..),
           allow_hyphen_values = true)]
     pub(super) max_stars: Option<u64>,
+    /// Search satellites, aeroplanes and meteors, too: straight lines of light
+    #[arg(long)]
+    pub(super) trails: bool,
     /// How to measure the position of a star
     #[arg(long, value_name = "METHOD", value_enum)]
     pub(super) centroid: Option<Centroid>,
@@ -143,6 +146,7 @@ impl ProcessArgs {
     fn options(&self) -> Result<SolveOptions, CommandError> {
         let mut options = self.solving.options()?;
         options.sky = self.sky;
+        options.trails = self.detection.trails || self.sky;
         options.exposure_s = self.exposure.exposure;
         options.zenith_distance_deg = self.exposure.zenith_distance;
         options.extinction_mag_per_airmass = self.exposure.extinction;

@@ -32,6 +32,7 @@ mod raster;
 mod shown;
 mod sky;
 mod svg;
+mod trails;
 
 #[doc(hidden)]
 pub use letters::FONT;
@@ -102,6 +103,7 @@ fn drawing(
     if let Some(found) = solution.outcome.identification() {
         sky::draw(&mut canvas, &picture, found, options.sky, &mut room);
     }
+    trails::draw(&mut canvas, &picture, solution);
     for mark in room.marked().iter().rev() {
         mark.draw(&mut canvas);
     }
