@@ -9,6 +9,7 @@ trail's height is that of its ridge over the noise of a pixel.
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import pathlib
@@ -159,9 +160,9 @@ def main():
             sure = [star for star in clean["stars"] if star["snr"] > 10 and not near_trail(trails, star)]
             stars += len(sure)
             lost += sum(not any(math.hypot(star["x"] - s["x"], star["y"] - s["y"]) < 0.5 for s in seen["stars"]) for star in sure)
-    print("| height of the ridge over the noise | " + " | ".join(f"{a} to {b} px long" for a, b in zip(LENGTHS, LENGTHS[1:])) + " |")
+    print("| height of the ridge over the noise | " + " | ".join(f"{a} to {b} px long" for a, b in itertools.pairwise(LENGTHS)) + " |")
     print("|---" * len(LENGTHS) + "|")
-    for low, high in zip(HEIGHTS, HEIGHTS[1:]):
+    for low, high in itertools.pairwise(HEIGHTS):
         counts = [cells[low, length] for length in LENGTHS[:-1]]
         print(f"| {low} to {high} | " + " | ".join(f"{found} of {count}" for count, found in counts) + " |")
     print(f"\n{options.frames} frames, {left_out} without a zero point left out")

@@ -48,4 +48,5 @@ mod spots;
 mod terminal;
 mod tiles;
 mod track;
+mod trails;
 mod validate;

@@ -1,0 +1,111 @@
+//! Satellites as lines, found by the program.
+
+use crate::common::{Ran, number, orion, shared_dir, starpipe};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn processed(frame: &Path, options: &[&str]) -> Value {
+    let ran = Ran::new(
+        starpipe()
+            .args(["process", "--format=json"])
+            .args(options)
+            .arg(frame),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    ran.reports().remove(0)
+}
+
+fn trails(report: &Value) -> &[Value] {
+    report["trails"].as_array().expect("they were searched")
+}
+
+/// Simulates a frame of Orion that satellites cross, and returns the ends of each.
+fn simulated(frame: &Path) -> Vec<[f64; 4]> {
+    let ran = Ran::new(
+        starpipe()
+            .args(["simulate", "--preset=imx174-35mm", "--ra=84", "--dec=3"])
+            .args(["--date=2024-01-05T21:00:00Z", "--exposure=1", "--seed=2"])
+            .args(["--trails=2", "--trail-rate-deg-s=2", "--trail-vmag=4"])
+            .arg(format!("--out={}", frame.display())),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let table = fs::read_to_string(frame.with_extension("csv")).unwrap();
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|title| *title == name).unwrap();
+    let columns = ["x", "y", "x_end", "y_end"].map(column);
+    lines
+        .map(|line| line.split(',').collect::<Vec<_>>())
+        .filter(|row| row[column("kind")] == "trail")
+        .map(|row| columns.map(|at| row[at].parse().unwrap()))
+        .collect()
+}
+
+#[test]
+fn satellites_are_found_where_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    let frame = directory.path().join("crossed.tif");
+    let expected = simulated(&frame);
+    let plain = processed(&frame, &[]);
+    let report = processed(&frame, &["--trails", "--site=50,10,300"]);
+    assert!(plain.get("trails").is_none());
+    assert_eq!(
+        plain["stars"].as_array().unwrap().len(),
+        report["stars"].as_array().unwrap().len()
+    );
+    assert!(!expected.is_empty());
+    assert_eq!(trails(&report).len(), expected.len(), "{expected:?}");
+    for [x, y, x_end, y_end] in expected {
+        let off = |trail: &Value| {
+            let value = |key: &str| trail[key].as_f64().unwrap();
+            let from = |x: f64, y: f64, end: &str| {
+                (value(&format!("x_{end}")) - x).hypot(value(&format!("y_{end}")) - y)
+            };
+            let one = from(x, y, "begin").max(from(x_end, y_end, "end"));
+            one.min(from(x, y, "end").max(from(x_end, y_end, "begin")))
+        };
+        let nearest = trails(&report)
+            .iter()
+            .min_by(|a, b| off(a).total_cmp(&off(b)));
+        let trail = nearest.unwrap();
+        assert!(off(trail) < 3.0, "{x}, {y} to {x_end}, {y_end}: {trail}");
+        assert!((number(trail, "/vmag") - 4.0).abs() < 0.15, "{trail}");
+        assert!((number(trail, "/length_deg") - 2.0).abs() < 0.05, "{trail}");
+        assert!(number(trail, "/altitude_begin_deg") > 30.0, "{trail}");
+    }
+    let notes = report["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|note| note["code"] == "trails"));
+}
+
+#[test]
+fn stars_alone_are_no_trails() {
+    assert!(trails(&processed(&orion(), &["--trails"])).is_empty());
+}
+
+#[test]
+fn of_the_real_frames_one_has_a_satellite() {
+    let Some(shared) = shared_dir() else { return };
+    let of = |name: &str| {
+        let name = format!("frames/2019-07-29T204726_{name}_Try1.tiff");
+        trails(&processed(&shared.join(name), &["--trails"])).to_vec()
+    };
+    for name in ["Alt40_Azi-135", "Alt40_Azi135", "Alt60_Azi135"] {
+        assert_eq!(of(name), [] as [Value; 0], "{name}");
+    }
+    let [trail] = &of("Alt60_Azi-135")[..] else {
+        panic!("one satellite");
+    };
+    // As it is seen in the picture.
+    for (key, expected_px) in [
+        ("x_begin", 212.0),
+        ("y_begin", 171.5),
+        ("x_end", 326.5),
+        ("y_end", 147.5),
+    ] {
+        assert!(
+            (trail[key].as_f64().unwrap() - expected_px).abs() < 4.0,
+            "{trail}"
+        );
+    }
+}
