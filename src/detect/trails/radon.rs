@@ -73,11 +73,12 @@ pub(super) fn significant_lines(map: &CellMap, false_alarms: f64) -> Vec<Line> {
             for found in strongest_in_strips([width, height], cell) {
                 // Lines may go into the padding below the map; their sums do not.
                 let [x, y] = found.first;
-                let last = found.rows.min(height - y) - 1;
-                let right = (found.right * last + (found.rows - 1) / 2) / (found.rows - 1);
-                if last < MIN_CELLS / 2 || log10_tail(found.snr) > log10_limit {
+                let rows = found.rows.min(height.saturating_sub(y));
+                if rows <= MIN_CELLS / 2 || log10_tail(found.snr) > log10_limit {
                     continue;
                 }
+                let last = rows - 1;
+                let right = (found.right * last + (found.rows - 1) / 2) / (found.rows - 1);
                 lines.push(Line {
                     ends: [place(x, y), place((x + right).min(width - 1), y + last)],
                     snr: found.snr,
