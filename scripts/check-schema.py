@@ -26,6 +26,17 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SCHEMA = json.loads((ROOT / "docs/schema/starpipe.schema.json").read_text())
 CAMERA = "docs/validation/camera.toml"
 
+ALL_SKY = "docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500"
+
+
+def night_frame(number):
+    """The command that draws a frame of the evening: one each ten minutes, and a knock before the last three."""
+    hours, minutes = divmod(17 * 60 + 40 + 10 * number, 60)
+    zenith_deg = 27.709 + 2.5068 * number + (4 if number >= 5 else 0)
+    date = f"2026-01-15T{hours}:{minutes:02}Z"
+    return f"simulate: simulate --camera {ALL_SKY} --date {date} --ra {zenith_deg:.3f} --dec 46.929 --first {number} --out OUT/allsky"
+
+
 # Definition in the schema, and the command; OUT is a directory. Later commands read what earlier ones
 # wrote. None: only what is written matters.
 COMMANDS = f"""
@@ -49,11 +60,12 @@ process: process --attitude-only --frame-of apparent --date 2026-01-01 fixtures/
 None: process --format csv --out OUT/tables fixtures/orion/orion.png
 process: identify --pixel-scale 113.7 OUT/tables/orion.csv
 process: identify --pixel-scale 10 OUT/tables/orion.csv
-simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
+simulate: simulate --camera {ALL_SKY} --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
 process: sky --camera docs/start/all-sky.toml --site 47,8,500 OUT/sky.tif
 process: sky fixtures/orion/orion.png
-simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:10Z --ra 65.32 --dec 46.93 --first 1 --out OUT/allsky
-simulate: simulate --camera docs/start/all-sky.toml --exposure 20 --by-altitude 1 --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --first 0 --out OUT/allsky
+simulate: simulate --preset imx174-35mm --ra 84 --dec 3 --date 2024-01-05T21:00Z --exposure 1 --seed 2 --trails 2 --trail-rate-deg-s 2 --trail-vmag 4 --out OUT/crossed.tif
+process: process --trails --site 50,10,300 OUT/crossed.tif
+{chr(10).join(night_frame(number) for number in range(8))}
 night: night --camera docs/start/all-sky.toml --site 47,8,500 --out OUT/a-night OUT/allsky
 night_frame: file OUT/a-night/night.jsonl
 calibrate: calibrate --site 47,8,500 OUT/night fixtures/regression/no-stars.tif -o OUT/lens.toml

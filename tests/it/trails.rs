@@ -54,9 +54,13 @@ fn satellites_are_found_where_they_are() {
         plain["stars"].as_array().unwrap().len(),
         report["stars"].as_array().unwrap().len()
     );
-    assert!(!expected.is_empty());
     assert_eq!(trails(&report).len(), expected.len(), "{expected:?}");
-    for [x, y, x_end, y_end] in expected {
+    let [width, height] = ["width", "height"].map(|key| report[key].as_f64().unwrap());
+    let is_inside = |x: f64, y: f64| (0.0..width).contains(&x) && (0.0..height).contains(&y);
+    let mut whole = expected;
+    whole.retain(|[x, y, x_end, y_end]| is_inside(*x, *y) && is_inside(*x_end, *y_end));
+    assert!(!whole.is_empty());
+    for [x, y, x_end, y_end] in whole {
         let off = |trail: &Value| {
             let value = |key: &str| trail[key].as_f64().unwrap();
             let from = |x: f64, y: f64, end: &str| {
