@@ -1,7 +1,7 @@
 //! The pixels along a line: a ridge of light is fitted to them, and its ends are found.
 
-use super::TrailSearch;
 use super::cells::CellMap;
+use super::input::TrailSearch;
 use crate::base::coords::PixelPoint;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;

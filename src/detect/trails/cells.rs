@@ -1,6 +1,6 @@
 //! What is left of a frame without its stars, in square cells.
 
-use super::TrailSearch;
+use super::input::TrailSearch;
 use super::radon::{self, Line};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median_and_sigma;
@@ -212,6 +212,11 @@ impl CellMap {
                 }
             }
         }
+    }
+
+    /// The lines that stand out, strongest first; in a map of noise there are `false_alarms`.
+    pub fn significant_lines(&self, false_alarms: f64) -> Vec<Line> {
+        radon::significant_lines([self.columns, self.rows], &self.values, false_alarms)
     }
 
     /// Whether a line still stands out.

@@ -26,10 +26,11 @@
 
 mod band;
 mod cells;
+mod input;
 mod radon;
 
-use super::background::Mesh;
-use super::detection::Detections;
+pub(super) use input::TrailSearch;
+
 use super::pixels::View;
 use crate::base::coords::PixelPoint;
 use band::{Band, Ridge};
@@ -76,15 +77,6 @@ impl Trail {
     }
 }
 
-/// The pixels of a frame and what is known of them, in which trails are searched.
-pub(super) struct TrailSearch<'a> {
-    pub view: &'a View<'a>,
-    pub mesh: &'a Mesh,
-    pub found: &'a Detections,
-    /// Standard deviation of a star in the pixels: of the largest spots of the frame.
-    pub spot_px: f64,
-}
-
 impl TrailSearch<'_> {
     /// The trails, most significant first.
     pub fn run(&self) -> Vec<Trail> {
@@ -93,7 +85,7 @@ impl TrailSearch<'_> {
         let mut followed = 0;
         for _ in 0..MAX_ROUNDS {
             let before = trails.len();
-            for line in radon::significant_lines(&cells, FALSE_TRAILS_PER_FRAME) {
+            for line in cells.significant_lines(FALSE_TRAILS_PER_FRAME) {
                 if followed == MAX_FOLLOWED || self.view.is_interrupted() {
                     break;
                 }

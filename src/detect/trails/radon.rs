@@ -4,7 +4,6 @@
 //! to the right down to the last one. It is a line of the upper half of the strip followed by one of the lower half, so
 //! all sums of N × N cells take N² log₂ N additions. The map mirrored and turned gives the other lines.
 
-use super::cells::CellMap;
 use crate::base::coords::PixelPoint;
 use std::f64::consts::{LN_10, PI};
 
@@ -53,14 +52,18 @@ pub(super) fn log10_tail(snr: f64) -> f64 {
 
 /// The lines that stand out: of each strip of rows or columns the strongest, strongest first. In a map of
 /// noise there are `false_alarms`.
-pub(super) fn significant_lines(map: &CellMap, false_alarms: f64) -> Vec<Line> {
-    let log10_limit = (false_alarms / lines_of(map.columns, map.rows) as f64).log10();
+pub(super) fn significant_lines(
+    [columns, rows]: [usize; 2],
+    values: &[f32],
+    false_alarms: f64,
+) -> Vec<Line> {
+    let log10_limit = (false_alarms / lines_of(columns, rows) as f64).log10();
     let mut lines = Vec::new();
     for is_turned in [false, true] {
         for is_mirrored in [false, true] {
             let (width, height) = match is_turned {
-                false => (map.columns, map.rows),
-                true => (map.rows, map.columns),
+                false => (columns, rows),
+                true => (rows, columns),
             };
             let place = |x: usize, y: usize| {
                 let x = if is_mirrored { width - 1 - x } else { x };
@@ -68,7 +71,7 @@ pub(super) fn significant_lines(map: &CellMap, false_alarms: f64) -> Vec<Line> {
             };
             let cell = |x: usize, y: usize| {
                 let [column, row] = place(x, y);
-                map.values[row * map.columns + column]
+                values[row * columns + column]
             };
             for found in strongest_in_strips([width, height], cell) {
                 // Lines may go into the padding below the map; their sums do not.
