@@ -1,6 +1,6 @@
 //! Satellites, aeroplanes and meteors: lines in a frame whose stars are known.
 //!
-//! `Frame`, its background and its [`Detections`] → [`Trail`]s, the most significant first.
+//! `Frame`, its background and its `Detections` → [`Trail`]s, the most significant first.
 //!
 //! 1. `cells`: what is left of the frame after background, stars and what hides the sky, in cells of
 //!    about a star's spot, over its noise.
