@@ -3,13 +3,13 @@
 use super::exit::{CommandError, Outcome, Tally};
 use super::input::frames::{FrameList, read_frame};
 use super::input::stdin::is_stdin;
+use super::options::calibration::CalibrationOptions;
 use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::options::hints::HintOptions;
 use super::options::values;
 use super::output::messages::report_error;
 use super::output::stdout::print;
-use super::process::CalibrationOptions;
 use anyhow::Context as _;
 use clap::Args;
 use starpipe::base::epoch::ObservationDate;

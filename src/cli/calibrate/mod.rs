@@ -7,6 +7,7 @@ mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::FrameList;
+use super::options::calibration::CalibrationOptions;
 use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::options::frames::{FrameOptions, MemoryOption};
@@ -16,7 +17,6 @@ use super::output::messages::report_error;
 use super::output::rows::json_line;
 use super::page::HtmlOption;
 use super::plot::PlotFile;
-use super::process::CalibrationOptions;
 use super::progress::frames_bar;
 use super::solving::{Inputs, Plan, Sink, Solved, Solver};
 use clap::Args;

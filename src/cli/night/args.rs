@@ -2,12 +2,12 @@
 
 use super::files;
 use crate::cli::exit::CommandError;
+use crate::cli::options::calibration::CalibrationOptions;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
 use crate::cli::options::frames::MemoryOption;
 use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
-use crate::cli::process::CalibrationOptions;
 use crate::cli::solving::Plan;
 use clap::Args;
 use jiff::SignedDuration;

@@ -3,7 +3,7 @@
 use crate::cli::output::files::NewFile;
 use crate::cli::output::rows::json_indented;
 use starpipe::archive::TableWriter;
-use starpipe::base::table::write_row;
+use starpipe::base::table::{finished, write_row};
 use starpipe::night::{self, NightRow, NightSummary, SkyglowStation, skyglow};
 use std::path::Path;
 
@@ -57,10 +57,7 @@ pub(super) fn csv(rows: &[NightRow]) -> anyhow::Result<String> {
     for row in rows {
         write_row(&mut writer, &columns, row)?;
     }
-    let bytes = writer
-        .into_inner()
-        .map_err(csv::IntoInnerError::into_error)?;
-    Ok(String::from_utf8(bytes)?)
+    Ok(finished(writer)?)
 }
 
 fn parquet(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {

@@ -16,7 +16,6 @@ use super::input::names::frame_names;
 use super::options::format::PageFormat;
 use super::output::files::{make_directory, write_whole};
 use super::output::rows::json_line;
-use super::process::hash_of;
 use super::solving::Plan;
 use journal::Journal;
 use run::{BATCH, Measured, Run};
@@ -98,20 +97,15 @@ fn configuration(
     plan: &Plan,
     catalog: &Catalog,
 ) -> anyhow::Result<Configuration> {
-    let calibration = &arguments.calibration;
+    let NightArgs {
+        calibration, hints, ..
+    } = arguments;
     Ok(Configuration {
-        catalog: catalog.into(),
-        options: plan.options.clone(),
-        camera: hash_of(&arguments.hints.camera)?,
-        dark: hash_of(&calibration.dark)?,
-        flat: hash_of(&calibration.flat)?,
-        hot_pixels: hash_of(&calibration.hot_pixels)?,
-        mask: hash_of(&calibration.mask)?,
-        page: None,
         night: Some(NightConfiguration {
             utc_offset_h: arguments.utc_offset,
             mask_hot_pixels: arguments.mask_hot_pixels,
         }),
+        ..calibration.configuration(catalog, &plan.options, hints)?
     })
 }
 

@@ -27,35 +27,15 @@ pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow
             "{:.1} of {:.1} hours were clear.",
             summary.clear_hours, summary.hours
         ),
-        facts: facts(summary),
+        facts: text::medians(summary)
+            .map(|median| Fact::new(format!("Median {}", median.name), median.value))
+            .collect(),
         text: text::text(summary),
         figures: figure.into_iter().collect(),
         tables,
         provenance: vec![options()],
         ..Page::default()
     })
-}
-
-fn facts(summary: &NightSummary) -> Vec<Fact> {
-    let median = &summary.median;
-    let values = [
-        ("Zenith", median.zenith_mag_arcsec2, "mag/arcsec²"),
-        ("Half of the stars are found at V", median.limit_vmag, ""),
-        (
-            "Measured minus predicted",
-            median.limit_difference_mag,
-            "mag",
-        ),
-        (
-            "Extinction",
-            median.extinction_mag_per_airmass,
-            "mag per airmass",
-        ),
-    ];
-    let fact = |(name, value, unit): (&str, Option<f64>, &str)| {
-        Some(Fact::new(name, format!("{:.2} {unit}", value?)))
-    };
-    values.into_iter().filter_map(fact).collect()
 }
 
 /// A moment as a line of a table.

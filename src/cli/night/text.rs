@@ -27,28 +27,10 @@ pub(super) fn text(night: &NightSummary) -> String {
             hour.zenith_mag_arcsec2, hour.from, hour.to
         );
     }
-    let median = &night.median;
-    let values = [
-        ("zenith", median.zenith_mag_arcsec2, " mag/arcsec²"),
-        ("limit", median.limit_vmag, " V"),
-        ("minus expected", median.limit_difference_mag, " mag"),
-        (
-            "extinction",
-            median.extinction_mag_per_airmass,
-            " mag per airmass",
-        ),
-        (
-            "clouds",
-            median.cloud_share.map(|share| 100.0 * share),
-            " %",
-        ),
-    ];
-    let values = values
-        .into_iter()
-        .filter_map(|(name, value, unit)| Some(format!("{name} {:.2}{unit}", value?)));
-    let values: Vec<String> = values.collect();
-    if !values.is_empty() {
-        let _ = writeln!(text, "medians    {}", values.join(", "));
+    let medians = medians(night).map(|median| format!("{} {}", median.name, median.value));
+    let medians: Vec<String> = medians.collect();
+    if !medians.is_empty() {
+        let _ = writeln!(text, "medians    {}", medians.join(", "));
     }
     if let Some(pixels) = night.hot_pixels.filter(|pixels| *pixels > 0) {
         let _ = writeln!(
@@ -61,6 +43,32 @@ pub(super) fn text(night: &NightSummary) -> String {
         let _ = writeln!(text, "{:<10} {}", time_of(&moment.date), moment.to_text());
     }
     text
+}
+
+/// The median of a series, as it is shown.
+pub(super) struct Shown {
+    pub(super) name: &'static str,
+    /// With its unit.
+    pub(super) value: String,
+}
+
+/// The medians that there are.
+pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = Shown> {
+    let of = &night.median;
+    let cloud_percent = of.cloud_share.map(|share| 100.0 * share);
+    let extinction = of.extinction_mag_per_airmass;
+    let all = [
+        ("zenith", of.zenith_mag_arcsec2, "mag/arcsec²"),
+        ("limit", of.limit_vmag, "V"),
+        ("measured minus expected limit", of.limit_difference_mag, "mag"),
+        ("extinction", extinction, "mag per airmass"),
+        ("clouds", cloud_percent, "%"),
+    ];
+    let shown = |(name, value, unit): (&'static str, Option<f64>, &str)| {
+        let value = format!("{:.2} {unit}", value?);
+        Some(Shown { name, value })
+    };
+    all.into_iter().filter_map(shown)
 }
 
 fn or_dash(text: &str) -> &str {

@@ -1,5 +1,6 @@
 //! Options that several commands share, with what they stand for.
 
+pub(crate) mod calibration;
 pub(crate) mod catalog;
 pub(crate) mod format;
 pub(crate) mod frames;

@@ -1,17 +1,14 @@
 //! The arguments of `process`, and what they make of a [`Plan`].
 
 use crate::cli::exit::CommandError;
-use crate::cli::input::frames::read_master;
+use crate::cli::options::calibration::CalibrationOptions;
 use crate::cli::options::frames::{FrameOptions, MemoryOption};
 use crate::cli::options::hints::set;
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
 use crate::cli::solving::options::SolvingOptions;
-use anyhow::Context as _;
 use clap::{Args, ValueEnum, value_parser};
 use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
-use starpipe::calibration::{Calibration, read_hot_pixels};
-use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::detect::CentroidMethod;
 use starpipe::frame::PageChoice;
 use starpipe::pipeline::SolveOptions;
@@ -54,24 +51,6 @@ pub(crate) struct ProcessArgs {
     pub(super) solving: SolvingOptions,
     #[command(flatten)]
     pub(super) parts: PartOptions,
-}
-
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Calibration")]
-pub(crate) struct CalibrationOptions {
-    /// Dark frame or master dark to subtract; see `starpipe darks`
-    #[arg(long, value_name = "FILE")]
-    pub(crate) dark: Option<PathBuf>,
-    /// Master flat: the signal above the dark level is divided by it; see `starpipe flats`
-    #[arg(long, value_name = "FILE")]
-    pub(crate) flat: Option<PathBuf>,
-    /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
-    #[arg(long, value_name = "FILE.csv")]
-    pub(crate) hot_pixels: Option<PathBuf>,
-    /// Image of the frame's size that is black where the frame does not show the sky: trees, houses,
-    /// lamps
-    #[arg(long, value_name = "FILE")]
-    pub(crate) mask: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -172,30 +151,6 @@ impl ProcessArgs {
             camera,
             memory: self.memory.limit(),
         })
-    }
-}
-
-impl CalibrationOptions {
-    /// Reads the calibration, if any is given. Without a dark, the bias is that of the camera.
-    pub(crate) fn read(
-        &self,
-        camera: Option<&CameraDescription>,
-    ) -> anyhow::Result<Option<Calibration>> {
-        let files = [&self.dark, &self.flat, &self.hot_pixels, &self.mask];
-        if files.into_iter().all(Option::is_none) {
-            return Ok(None);
-        }
-        let master = |path: &Option<PathBuf>| path.as_deref().map(read_master).transpose();
-        let list = self.hot_pixels.as_deref().map(read_hot_pixels).transpose();
-        let sheet = camera.and_then(|camera| camera.sheet.as_ref());
-        let bias_adu = sheet.map_or(0.0, |sheet| sheet.bias_adu);
-        let calibration = Calibration::new(
-            master(&self.dark)?,
-            master(&self.flat)?,
-            list.context("reading the hot pixels")?,
-            bias_adu,
-        );
-        Ok(Some(calibration?.with_mask(master(&self.mask)?)))
     }
 }
 

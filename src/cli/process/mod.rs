@@ -1,11 +1,9 @@
 //! `process`: finds and identifies the stars in frames.
 
 mod args;
-mod configuration;
 mod parts;
 
-pub(crate) use args::{CalibrationOptions, ProcessArgs};
-pub(crate) use configuration::hash_of;
+pub(crate) use args::ProcessArgs;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::FrameList;

@@ -1,16 +1,15 @@
 //! `--out-parquet`: the frames of one worker, part by part, as rows of tables.
 
 use super::args::ProcessArgs;
-use super::configuration::configuration;
 use crate::cli::exit::{CommandError, Outcome, Tally};
 use crate::cli::input::names::frame_names;
 use crate::cli::output::messages::{one_line, report_error};
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{Inputs, Sink, Solved, Solver};
 use indicatif::ProgressBar;
-use starpipe::archive::{Archive, ArchiveError, FrameRow, Part, Plan, Shard};
+use starpipe::archive::{Archive, ArchiveError, Configuration, FrameRow, Part, Plan, Shard};
 use starpipe::base::format::counted;
-use starpipe::frame::ImageName;
+use starpipe::frame::{ImageName, PageChoice};
 use starpipe::report::{FrameReport, StarRow};
 use starpipe::sky::catalog::Catalog;
 use std::ops::ControlFlow;
@@ -27,7 +26,14 @@ pub(super) fn process_parts(
     let plan = Plan::new(names, options.frames_per_part)?;
     let inputs = Inputs::Frames(arguments.page.unwrap_or_default());
     arguments.solving.catalog.with_index(|pool, indexed| {
-        let configuration = configuration(arguments, &solving.options, indexed.catalog())?;
+        let ProcessArgs {
+            calibration, page, ..
+        } = arguments;
+        let hints = &arguments.solving.hints;
+        let configuration = Configuration {
+            page: page.and_then(text_of),
+            ..calibration.configuration(indexed.catalog(), &solving.options, hints)?
+        };
         let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
         let worker = Worker(Solver {
             pool,
@@ -152,5 +158,14 @@ impl Counts {
             text: text + "\n",
             exit: self.frames.exit(),
         }
+    }
+}
+
+/// The choice as it is given.
+fn text_of(page: PageChoice) -> Option<String> {
+    match page {
+        PageChoice::Main => None,
+        PageChoice::Number(number) => Some(number.to_string()),
+        PageChoice::All => Some("all".to_owned()),
     }
 }

@@ -9,6 +9,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::{
     CameraModel, Distortion, DistortionModel, LENS_TERMS, MAX_TERMS, MONOMIALS, Observed, monomials,
 };
+use crate::identify::field::ObservedStar;
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector, Vector3};
 
@@ -21,6 +22,19 @@ pub struct MeasuredStar {
     pub icrs: UnitVector<Icrs>,
     /// Standard error of the measured position on each axis, in pixels.
     pub sigma_px: f64,
+}
+
+impl MeasuredStar {
+    /// An observed star with its direction; all measure worse by `excess_px` than stated.
+    pub fn of(star: &ObservedStar, icrs: UnitVector<Icrs>, excess_px: f64) -> Self {
+        /// Errors of lists that state none.
+        const LEAST_PX: f64 = 1e-3;
+        Self {
+            pixel: star.position,
+            icrs,
+            sigma_px: libm::hypot(star.sigma_px, excess_px).max(LEAST_PX),
+        }
+    }
 }
 
 /// The standard error of an outlier (with an unresolved companion, for example) as it counts in a fit:

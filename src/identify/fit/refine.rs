@@ -402,12 +402,9 @@ impl Refiner {
     fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
             let star = &problem.field.stars[pair.observed];
-            let sigma_px = (star.sigma_px.powi(2) + excess_px.powi(2)).sqrt().max(1e-3);
-            MeasuredStar {
-                pixel: star.position,
-                icrs: pair.direction,
-                sigma_px: robust_sigma_px(sigma_px, pair.residual_px),
-            }
+            let mut measured = MeasuredStar::of(star, pair.direction, excess_px);
+            measured.sigma_px = robust_sigma_px(measured.sigma_px, pair.residual_px);
+            measured
         };
         self.stars.clear();
         self.stars.extend(self.pairs.iter().map(measured));

@@ -177,10 +177,10 @@ impl<'a> Search<'a> {
         seed.clear();
         seed.extend(refiner.pairs.iter().map(|pair| {
             let star = &window.field.stars[pair.observed];
+            let measured = MeasuredStar::of(star, pair.direction, refined.excess_sigma_px);
             MeasuredStar {
                 pixel: window.in_frame(&star.position),
-                icrs: pair.direction,
-                sigma_px: star.sigma_px.hypot(refined.excess_sigma_px).max(1e-3),
+                ..measured
             }
         }));
         let seed = Seed::of_window(whole.field, window.centre(), &refined.hypothesis(), seed);
@@ -224,11 +224,11 @@ impl<'a> Search<'a> {
         seed.clear();
         let of_middle = refiner.pairs.iter();
         let of_middle = of_middle.filter(|pair| angle_rad(pair) < MIDDLE * outermost_rad);
-        seed.extend(of_middle.map(|pair| MeasuredStar {
-            pixel: stars[pair.observed].position,
-            icrs: pair.direction,
-            sigma_px: stars[pair.observed].sigma_px.hypot(answer.excess_sigma_px),
-        }));
+        let measured = |pair: &Pair| {
+            let star = &stars[pair.observed];
+            MeasuredStar::of(star, pair.direction, answer.excess_sigma_px)
+        };
+        seed.extend(of_middle.map(measured));
         growth.grow(problem, &Seed::of_middle(&hypothesis, seed))
     }
 
