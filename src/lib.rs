@@ -66,6 +66,9 @@
 //! `docs/public-api.txt` lists it. What is public but hidden here serves the program, the Python
 //! package and their tests, and may change at any time.
 
+// The same frame gives the same bytes on every system.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 #[cfg(feature = "archive")]
 #[doc(hidden)]
 pub mod archive;

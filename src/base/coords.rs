@@ -222,7 +222,7 @@ impl<A, B> Rotation<A, B> {
     /// The angle in radians by which the two rotations differ.
     pub fn angle_to(&self, other: &Self) -> f64 {
         let difference = (self.matrix() - other.matrix()).norm();
-        2.0 * (difference / 8f64.sqrt()).min(1.0).asin()
+        2.0 * libm::asin((difference / 8f64.sqrt()).min(1.0))
     }
 }
 

@@ -27,6 +27,6 @@ impl Size {
 
     /// From corner to corner, in pixels.
     pub fn diagonal_px(self) -> f64 {
-        (self.width as f64).hypot(self.height as f64)
+        libm::hypot(self.width as f64, self.height as f64)
     }
 }

@@ -91,14 +91,14 @@ impl LnProduct {
     pub fn multiply(&mut self, number: f64) {
         self.factor *= number;
         if self.factor < 1e-200 {
-            self.ln += self.factor.ln();
+            self.ln += libm::log(self.factor);
             self.factor = 1.0;
         }
     }
 
     /// The natural logarithm of the product.
     pub fn ln(&self) -> f64 {
-        self.ln + self.factor.ln()
+        self.ln + libm::log(self.factor)
     }
 }
 
@@ -139,16 +139,16 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     if trials > MANY_TRIALS && (hits as f64) < trials as f64 * chance {
         // Below the mean the terms rise, and up to `trials` of them matter.
         let too_few = log10_binomial_tail(trials, trials - hits + 1, 1.0 - chance);
-        return (-10f64.powf(too_few)).ln_1p() / std::f64::consts::LN_10;
+        return libm::log1p(-libm::pow(10f64, too_few)) / std::f64::consts::LN_10;
     }
-    let (log_p, log_q) = (chance.ln(), (-chance).ln_1p());
+    let (log_p, log_q) = (libm::log(chance), libm::log1p(-chance));
     let mut log_term = hits as f64 * log_p + (trials - hits) as f64 * log_q;
     if hits > MANY_HITS {
         let log_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
         log_term += log_factorial(trials) - log_factorial(hits) - log_factorial(trials - hits);
     } else {
         for i in 0..hits {
-            log_term += ((trials - i) as f64).ln() - ((i + 1) as f64).ln();
+            log_term += libm::log((trials - i) as f64) - libm::log((i + 1) as f64);
         }
     }
     // The further terms, relative to the first.
@@ -161,7 +161,7 @@ pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
             break;
         }
     }
-    ((log_term + sum.ln()) / std::f64::consts::LN_10).min(0.0)
+    ((log_term + libm::log(sum)) / std::f64::consts::LN_10).min(0.0)
 }
 
 /// log10 of the probability of `hits` or more successes in trials with these `chances`.
@@ -192,7 +192,7 @@ pub fn log10_poisson_binomial_tail(chances: &[f64], hits: usize, scaled: &mut Ve
         }
         scaled[hits] *= 1.0 - chance;
     }
-    (scaled[0].log10() - hits as f64 * SUCCESS_SCALE.log10()).min(0.0)
+    (libm::log10(scaled[0]) - hits as f64 * libm::log10(SUCCESS_SCALE)).min(0.0)
 }
 
 #[cfg(test)]
@@ -219,7 +219,7 @@ mod tests {
         let numbers = || (1..2000).map(|i| 10f64.powf(-f64::from(i) / 20.0));
         let mut product = LnProduct::ONE;
         numbers().for_each(|number| product.multiply(number));
-        let sum: f64 = numbers().map(f64::ln).sum();
+        let sum: f64 = numbers().map(libm::log).sum();
         assert!((product.ln() / sum - 1.0).abs() < 1e-12);
     }
 

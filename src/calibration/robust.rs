@@ -82,7 +82,7 @@ fn valid(values: &[f32]) -> impl Iterator<Item = f64> {
 /// Wilson & Hilferty 1931, doi 10.1073/pnas.17.12.684: the cube root of χ²/ν is nearly normal.
 pub(super) fn variance_deviate(variance: f64, typical: f64, freedom: f64) -> f64 {
     let width = 2.0 / (9.0 * freedom);
-    ((variance / typical).cbrt() - (1.0 - width)) / width.sqrt()
+    (libm::cbrt(variance / typical) - (1.0 - width)) / width.sqrt()
 }
 
 /// The mean of variances with `freedom` degrees of freedom each, without outliers.

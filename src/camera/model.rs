@@ -187,7 +187,7 @@ impl CameraModel {
             let ideal = distortion.remove([0.0; 2])?;
             let [[uu, uv], [vu, vv]] = distortion.observe(ideal)?.by_ideal;
             let [x, y] = ideal.map(|along| along / self.focal_length_px);
-            let stretch = (1.0 + x * x + y * y).powf(1.5);
+            let stretch = libm::pow(1.0 + x * x + y * y, 1.5);
             Some(self.focal_length_px * ((uu * vv - uv * vu) * stretch).sqrt())
         };
         of_centre().unwrap_or(self.focal_length_px)
@@ -378,7 +378,7 @@ pub fn frame_centre(width_px: f64, height_px: f64) -> PixelPoint {
 
 /// Focal length, in pixels, of a pinhole camera whose field is `fov_rad` across `extent_px` pixels.
 pub fn focal_length_px(extent_px: f64, fov_rad: f64) -> f64 {
-    extent_px / 2.0 / (fov_rad / 2.0).tan()
+    extent_px / 2.0 / libm::tan(fov_rad / 2.0)
 }
 
 #[cfg(test)]

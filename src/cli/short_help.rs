@@ -5,7 +5,7 @@ use clap::Command;
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
 const SHOWN: [(&str, [&[&str]; 2]); 12] = [
-    ("process", [&["dark", "mask", "draw", "trails"], &SOLVING]),
+    ("process", [&["dark", "mask", "draw"], &SOLVING]),
     ("sky", [&["dark", "flat", "mask"], &SOLVING]),
     (
         "night",

@@ -136,7 +136,7 @@ impl LongestRuns {
     fn suspects(&self) -> Vec<usize> {
         let pixels = (self.rows * self.longest.len()).max(1) as f64;
         let chance = self.equal_share.clamp(1e-3, 0.999);
-        let run = (MAX_LN_CHANCE - pixels.ln()) / chance.ln();
+        let run = (MAX_LN_CHANCE - libm::log(pixels)) / libm::log(chance);
         let min_run = MIN_RUN.max(run.ceil() as usize);
         let columns = self.longest.iter().enumerate();
         let suspects = columns.filter(|&(_, &run)| run as usize >= min_run);

@@ -59,9 +59,10 @@ impl Identification {
         let boresight = self.icrs_to_camera.boresight();
         let in_ecliptic = boresight.as_vector().cross(&ecliptic_pole).norm();
         let along = SPEED_C * in_ecliptic * FRAC_1_SQRT_2;
-        self.focal_length_sigma_px = self
-            .focal_length_sigma_px
-            .hypot(along * self.camera.central_focal_length_px());
+        self.focal_length_sigma_px = libm::hypot(
+            self.focal_length_sigma_px,
+            along * self.camera.central_focal_length_px(),
+        );
     }
 
     /// Where the camera sees what appears in this direction; `None` if it does not.

@@ -217,7 +217,7 @@ fn project(
     predicted: &mut Vec<PredictedStar>,
 ) {
     let camera = view.camera;
-    let margin_px = MARGIN * camera.width_px.hypot(camera.height_px);
+    let margin_px = MARGIN * libm::hypot(camera.width_px, camera.height_px);
     let (boresight, chord) = (view.boresight(), chord_of(view.reach_rad()));
     // The cone is larger than the frame: a quick test rejects most stars outside it.
     let reach = tangent_reach(camera, margin_px);

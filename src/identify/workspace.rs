@@ -499,7 +499,7 @@ fn named_outwards(
         let settled = followed.and_then(|hypothesis| {
             let start = Start {
                 hypothesis: &hypothesis,
-                radius_px: RADIUS_SHARE * field.width_px.hypot(field.height_px),
+                radius_px: RADIUS_SHARE * libm::hypot(field.width_px, field.height_px),
                 sceptical: false,
                 stars: hypothesis.fitted_stars,
                 richest: DistortionModel::Irregular5,
@@ -528,7 +528,7 @@ struct Named {
 /// Fits as much distortion as the `stars` brightest stars support.
 fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) -> Option<Refined> {
     let field = problem.field;
-    let diagonal_px = field.width_px.hypot(field.height_px);
+    let diagonal_px = libm::hypot(field.width_px, field.height_px);
     let area_px2 = field.width_px * field.height_px;
     let by_chance_px = (CHANCE_PAIRS * area_px2 / (PI * stars as f64)).sqrt();
     let hypothesis = found.hypothesis();

@@ -207,7 +207,8 @@ impl Fitted {
             fit = fit_jointly(&weighted, &fit.camera, tested.model)?;
         }
         let distances_px = fit.residuals_px.iter().map(|residuals| {
-            let mut distances: Vec<f64> = residuals.iter().map(|[x, y]| x.hypot(*y)).collect();
+            let mut distances: Vec<f64> =
+                residuals.iter().map(|[x, y]| libm::hypot(*x, *y)).collect();
             median(&mut distances)
         });
         Some(Self {
@@ -329,8 +330,8 @@ fn reweighed(stated: &[JointFrame], fit: &JointFit) -> (f64, Vec<JointFrame>) {
         let mut frame = frame.clone();
         frame.icrs_to_camera = *attitude;
         for (star, [x, y]) in frame.stars.iter_mut().zip(residuals) {
-            let sigma_px = star.sigma_px.hypot(excess_sigma_px);
-            star.sigma_px = robust_sigma_px(sigma_px, x.hypot(*y));
+            let sigma_px = libm::hypot(star.sigma_px, excess_sigma_px);
+            star.sigma_px = robust_sigma_px(sigma_px, libm::hypot(*x, *y));
         }
         frame
     });

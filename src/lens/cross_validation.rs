@@ -35,7 +35,7 @@ pub(super) fn best_lens(frames: &[JointFrame], start: &CameraModel) -> Option<Te
     let of_projection = |projection: Projection| {
         let penalty = worth_a_projection(projection);
         let tested = best_model(frames, &start.reprojected(projection), stars)?;
-        Some((equations * tested.chi_sq.ln() + penalty, tested))
+        Some((equations * libm::log(tested.chi_sq) + penalty, tested))
     };
     let tested = projections.into_iter().filter_map(of_projection);
     let best = tested.min_by(|(a, _), (b, _)| a.total_cmp(b));
@@ -56,7 +56,7 @@ fn best_model(frames: &[JointFrame], start: &CameraModel, stars: usize) -> Optio
         };
         let is_better = |best: &Tested| {
             let wanted = model.map_or(0.0, |model| least_gain(model, best.model));
-            equations * (best.chi_sq / tested.chi_sq).ln() > wanted
+            equations * libm::log(best.chi_sq / tested.chi_sq) > wanted
         };
         if best.as_ref().is_none_or(is_better) {
             best = Some(tested);
@@ -95,7 +95,7 @@ fn test(
         for (left_out, attitude) in part(true).iter().zip(&fit.attitudes) {
             let residuals = residuals_px(&left_out.stars, &fit.camera, attitude)?;
             for (star, [x, y]) in left_out.stars.iter().zip(residuals) {
-                let sigma_px = robust_sigma_px(star.sigma_px, x.hypot(y));
+                let sigma_px = robust_sigma_px(star.sigma_px, libm::hypot(x, y));
                 chi_sq += (x * x + y * y) / (sigma_px * sigma_px);
                 squares.push(x * x + y * y);
             }

@@ -29,7 +29,7 @@ impl FrameScale {
     /// The scale of a frame, with the distortion of `camera`.
     pub(super) fn of(frame: &LensFrame, camera: &CameraModel, excess_sigma_px: f64) -> Self {
         let with_excess = |star: &MeasuredStar| MeasuredStar {
-            sigma_px: star.sigma_px.hypot(excess_sigma_px),
+            sigma_px: libm::hypot(star.sigma_px, excess_sigma_px),
             ..*star
         };
         let stars: Vec<MeasuredStar> = frame.joint.stars.iter().map(with_excess).collect();

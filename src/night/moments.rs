@@ -230,7 +230,7 @@ impl<'a> Series<'a> {
             let told = |row: &NightRow| Some(row).filter(is_told).and_then(value);
             self.rows.iter().map(told).collect()
         };
-        let widths = of(|row| row.spot_sigma_px.filter(|px| *px > 0.0).map(f64::ln));
+        let widths = of(|row| row.spot_sigma_px.filter(|px| *px > 0.0).map(libm::log));
         let wider = departures(&widths, LEAST_WIDENING);
         let dimmer = departures(&of(|row| row.dimming_mag), LEAST_DIMMING_MAG);
         let meets = |a: &Departure, b: &Departure| {

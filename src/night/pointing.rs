@@ -103,7 +103,7 @@ impl PointingHistory {
     }
 
     fn limit_rad(&self, sigma_rad: f64) -> f64 {
-        (SIGMAS * self.scatter_rad().hypot(sigma_rad)).max(LEAST_RAD)
+        (SIGMAS * libm::hypot(self.scatter_rad(), sigma_rad)).max(LEAST_RAD)
     }
 
     /// Counts a frame that does not agree with `held`.

@@ -48,7 +48,7 @@ struct Surroundings {
 /// Part of the light of a neighbor at this distance that is in the flux of a star: the
 /// autocorrelation of a Gaussian spot.
 pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
-    (-0.25 * distance_sigmas.powi(2)).exp()
+    libm::exp(-0.25 * distance_sigmas.powi(2))
 }
 
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
@@ -71,7 +71,7 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             let fainter_mag = neighbor.v_mag - star.v_mag;
             around.is_single &= fainter_mag >= CROWDING_MAG;
             if detections[near.index].is_none() {
-                let light = 10f64.powf(-0.4 * f64::from(fainter_mag));
+                let light = libm::pow(10f64, -0.4 * f64::from(fainter_mag));
                 around.undetected_light +=
                     light * filter_response(near.distance_px / spot_sigma_px);
             }

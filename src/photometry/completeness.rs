@@ -176,7 +176,7 @@ fn limit(stars: &[CountedStar], chance: f64) -> Result<Limit, NoLimit> {
     Ok(Limit {
         v_mag: fit.curve.v_mag,
         sigma_mag,
-        width_mag: fit.curve.ln_width.exp(),
+        width_mag: libm::exp(fit.curve.ln_width),
         lost: fit.curve.lost(),
     })
 }
@@ -213,8 +213,8 @@ impl Curve {
         let lost = lost.clamp(PRIOR_LOST / (PRIOR_LOST + PRIOR_KEPT), 0.9);
         let mut curve = Self {
             v_mag,
-            ln_width: TYPICAL_WIDTH_MAG.ln(),
-            logit_lost: (lost / (1.0 - lost)).ln(),
+            ln_width: libm::log(TYPICAL_WIDTH_MAG),
+            logit_lost: libm::log(lost / (1.0 - lost)),
             chance: chance.clamp(1e-6, 0.25),
         };
         let mut current = curve.likelihood(stars);
@@ -256,15 +256,17 @@ impl Curve {
     }
 
     fn lost(&self) -> f64 {
-        1.0 / (1.0 + (-self.logit_lost).exp())
+        1.0 / (1.0 + libm::exp(-self.logit_lost))
     }
 
     /// The prior of width and λ.
     fn prior(&self) -> Likelihood {
         let lost = self.lost();
-        let off = (self.ln_width - TYPICAL_WIDTH_MAG.ln()) / LN_WIDTH_SIGMA;
+        let off = (self.ln_width - libm::log(TYPICAL_WIDTH_MAG)) / LN_WIDTH_SIGMA;
         Likelihood {
-            log: -0.5 * off.powi(2) + PRIOR_LOST * lost.ln() + PRIOR_KEPT * (1.0 - lost).ln(),
+            log: -0.5 * off.powi(2)
+                + PRIOR_LOST * libm::log(lost)
+                + PRIOR_KEPT * libm::log(1.0 - lost),
             gradient: Vector3::new(
                 0.0,
                 -off / LN_WIDTH_SIGMA,
@@ -282,7 +284,7 @@ impl Curve {
     fn likelihood(&self, stars: &[CountedStar]) -> Likelihood {
         /// Stars further from m₅₀ than this many widths are treated alike.
         const FAR_WIDTHS: f64 = 5.0;
-        let (width, lost) = (self.ln_width.exp(), self.lost());
+        let (width, lost) = (libm::exp(self.ln_width), self.lost());
         let mut sum = self.prior();
         let full = 1.0 - self.chance - lost;
         // Adds `count` stars to gradient and information, and returns the probability of each one's
@@ -311,7 +313,7 @@ impl Curve {
         ] {
             let detected = far.iter().filter(|star| star.detected).count();
             for (is_detected, count) in [(true, detected), (false, far.len() - detected)] {
-                log += count as f64 * add(z, is_detected, count).ln();
+                log += count as f64 * libm::log(add(z, is_detected, count));
             }
         }
         let mut product = LnProduct::ONE;
@@ -331,7 +333,7 @@ fn best_step(stars: &[CountedStar]) -> Option<(f64, f64)> {
     let log_likelihood = |stars: usize, detected: usize| {
         let part = |count: usize| match count {
             0 => 0.0,
-            _ => count as f64 * (count as f64 / stars as f64).ln(),
+            _ => count as f64 * libm::log(count as f64 / stars as f64),
         };
         part(detected) + part(stars - detected)
     };

@@ -89,7 +89,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
     let mut zero_point = zero_point::measure(&standards);
     if let (Some(zero_point), Some(wings)) = (&mut zero_point, frame.detections.wings) {
         let common_sigma_mag = MAG_PER_RELATIVE * wings.sigma / (1.0 + wings.share);
-        zero_point.sigma_mag = zero_point.sigma_mag.hypot(common_sigma_mag);
+        zero_point.sigma_mag = libm::hypot(zero_point.sigma_mag, common_sigma_mag);
     }
     let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
     let mut completeness = match color_term {
@@ -181,7 +181,7 @@ impl Measured {
 /// −2.5 log10(`flux`): the magnitude without zero point.
 #[doc(hidden)]
 pub fn instrumental_mag(flux: f64) -> f64 {
-    -2.5 * flux.log10()
+    -2.5 * libm::log10(flux)
 }
 
 /// The V magnitude to which catalogue stars are predicted: clearly fainter ones cannot be detected.

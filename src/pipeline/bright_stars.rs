@@ -90,7 +90,7 @@ impl NamedFrame<'_> {
     fn missing(&self, star: &PredictedStar) -> MissingStar {
         let catalog = self.indexed.catalog();
         let camera = &self.identification.camera;
-        let reach_px = NEAR_SHARE * camera.width_px.hypot(camera.height_px);
+        let reach_px = NEAR_SHARE * libm::hypot(camera.width_px, camera.height_px);
         let distance_px = |detection: &Detection| detection.position.distance_to(&star.pixel);
         // The brightest comes first.
         let nearby = self.detections.sources.iter();

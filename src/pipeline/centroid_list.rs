@@ -72,7 +72,7 @@ impl ListedCentroid {
     /// Stars brighter than m are as many as 10^(m/2) on the sky. The magnitudes span half of that, so
     /// that a list in another order is not far from the truth either.
     pub fn mag_of_rank(rank: usize) -> f64 {
-        (rank as f64 + 1.0).log10()
+        libm::log10(rank as f64 + 1.0)
     }
 
     /// Why it cannot be used, if it cannot.
@@ -149,8 +149,8 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
         let [x, y] = [cell(place.x), cell(place.y)];
         let near = (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
         let mut brighter = near.filter_map(|cell| kept.get(&cell)).flatten();
-        let is_alone =
-            !brighter.any(|other| (other.x - place.x).hypot(other.y - place.y) < COINCIDENT_PX);
+        let is_alone = !brighter
+            .any(|other| libm::hypot(other.x - place.x, other.y - place.y) < COINCIDENT_PX);
         if is_alone {
             kept.entry([x, y]).or_default().push(place);
         }

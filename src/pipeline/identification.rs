@@ -114,7 +114,7 @@ pub(super) fn double_image(outcome: &mut Outcome, field: &StarField) -> Option<D
     let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
     let double = find_double_image(field, |star| named.contains(&star.source))?;
     let [x, y] = double.offset_px;
-    found.add_common_error(x.hypot(y) / 2.0);
+    found.add_common_error(libm::hypot(x, y) / 2.0);
     Some(double)
 }
 

@@ -44,7 +44,7 @@ impl Agreement {
         let fitted = self.log10_within(expected, agreeing, |star| {
             density_px2 * PI * agreeing_px.min(star.radius_px).powi(2)
         });
-        (searched.min(fitted + pairs.log10()) + TESTS.log10()).min(0.0)
+        (searched.min(fitted + libm::log10(pairs)) + libm::log10(TESTS)).min(0.0)
     }
 
     fn log10_within(

@@ -141,8 +141,8 @@ fn is_alone(sky: &IndexedCatalog, index: StarIndex, star: &GuideStar, wanted: &W
             is_alone &= fainter_mag > ALIKE_MAG;
             let apart_rad = (other.vector() - centre.as_vector()).norm();
             let widths = apart_rad / wanted.width_rad;
-            let share = 10f64.powf(-0.4 * fainter_mag);
-            shift_widths += share * widths * (-0.25 * widths * widths).exp();
+            let share = libm::pow(10f64, -0.4 * fainter_mag);
+            shift_widths += share * widths * libm::exp(-0.25 * widths * widths);
         });
     is_alone && shift_widths <= MAX_SHIFT_WIDTHS
 }

@@ -97,7 +97,7 @@ impl LensRefiner {
             by_pose, observed, ..
         } = &prediction;
         let offset = self.camera.offset_of(&star.pixel);
-        let weight = 1.0 / star.sigma_px.hypot(excess_px);
+        let weight = 1.0 / libm::hypot(star.sigma_px, excess_px);
         for axis in 0..2 {
             let of_monomials = prediction.monomials_along(axis);
             let by_parameters = by_pose[axis].into_iter().chain(observed.by_term[axis]);
@@ -145,7 +145,7 @@ impl LensRefiner {
         };
         root.solve_mut(&mut self.step);
         if self.step[0].abs() < MAX_STEP && self.step.iter().all(|step| step.is_finite()) {
-            let focal_length_px = self.camera.focal_length_px() * self.step[0].exp();
+            let focal_length_px = self.camera.focal_length_px() * libm::exp(self.step[0]);
             let steps = || self.step.iter().skip(1).copied();
             let distortion = self.camera.distortion().map(|known| known.changed(steps()));
             let camera = self.camera.with_focal_length(focal_length_px);

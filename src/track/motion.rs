@@ -152,7 +152,7 @@ impl AttitudeMotion {
             let adaptation = ADAPTATION.max(FIRST_ADAPTATION / f64::from(self.updates));
             for axis in 0..3 {
                 let excess = ratio(&prediction, axis).min(MAX_RATIO) - 1.0;
-                acceleration[axis] *= (adaptation * excess).min(MAX_ADAPTATION).exp();
+                acceleration[axis] *= libm::exp((adaptation * excess).min(MAX_ADAPTATION));
             }
         }
         for axis in 0..3 {

@@ -144,7 +144,7 @@ impl PoseFitter {
             MeasuredStar {
                 pixel: pixel.unwrap_or(star.position),
                 icrs: star.direction,
-                sigma_px: star.sigma_px.hypot(prior.excess_px),
+                sigma_px: libm::hypot(star.sigma_px, prior.excess_px),
             }
         };
         self.ideal.clear();
@@ -209,7 +209,7 @@ fn with_known_focal_length(fit: &CameraFit, prior: &PosePrior) -> Attitude {
     let variance = (prior.focal_sigma_px / known_px).powi(2);
     let with_focal: Vector4<f64> = fit.covariance.column(3).into_owned();
     let gain = with_focal / (variance + with_focal[3]);
-    let off = (known_px / fit.camera.focal_length_px()).ln();
+    let off = libm::log(known_px / fit.camera.focal_length_px());
     let turn = gain.fixed_rows::<3>(0) * off;
     let covariance = fit.covariance - gain * with_focal.transpose();
     Attitude {

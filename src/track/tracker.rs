@@ -387,10 +387,7 @@ impl TrackerState {
     fn is_of(&self, found: &Identification) -> bool {
         let (camera, other) = (self.lens.camera(), &found.camera);
         let apart_px = (camera.focal_length_px() - other.focal_length_px()).abs();
-        let sigma_px = self
-            .lens
-            .focal_sigma_px()
-            .hypot(found.focal_length_sigma_px);
+        let sigma_px = libm::hypot(self.lens.focal_sigma_px(), found.focal_length_sigma_px);
         // Models of distortion differ in their scale at the centre.
         let models_px = 1e-3 * camera.focal_length_px();
         [camera.width_px, camera.height_px] == [other.width_px, other.height_px]
@@ -561,7 +558,7 @@ impl PredictedView<'_> {
     /// Chooses the brightest stars that are well within the frame.
     fn choose(&self, guides: &[GuideStar], stars: usize, spot: &SpotModel, buffers: &mut Buffers) {
         let icrs_to_camera = &self.prediction.icrs_to_camera;
-        let cos_reach = self.camera.radius_rad().cos();
+        let cos_reach = libm::cos(self.camera.radius_rad());
         buffers.expected.clear();
         buffers.guides.clear();
         for guide in guides {

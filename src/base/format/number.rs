@@ -11,7 +11,7 @@ pub fn five_digits(value: f64) -> String {
             None => text,
         };
     }
-    let decimals = (4.0 - size.max(1e-3).log10().floor()).max(0.0) as usize;
+    let decimals = (4.0 - libm::log10(size.max(1e-3)).floor()).max(0.0) as usize;
     trimmed(&format!("{value:.decimals$}")).to_owned()
 }
 

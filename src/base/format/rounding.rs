@@ -18,7 +18,7 @@ pub(crate) fn to_significant(value: f64, digits: i32) -> f64 {
         return value;
     }
     // Dividing by a power of ten is exact where multiplying by its inverse is not.
-    let decimals = digits - 1 - value.abs().log10().floor() as i32;
+    let decimals = digits - 1 - libm::log10(value.abs()).floor() as i32;
     if decimals >= 0 {
         to_decimals(value, decimals)
     } else {
@@ -58,7 +58,7 @@ pub(crate) fn decimals_for(sigma: f64, most: usize) -> usize {
     if !(sigma > 0.0 && sigma.is_finite()) {
         return most;
     }
-    let wanted = 1.0 - sigma.log10().floor();
+    let wanted = 1.0 - libm::log10(sigma).floor();
     wanted.clamp(0.0, most as f64) as usize
 }
 

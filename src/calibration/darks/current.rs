@@ -107,7 +107,7 @@ impl DarkCurrent {
             std::f64::consts::FRAC_PI_2.sqrt() * of_pixels.sigma / (valid.count() as f64).sqrt();
         Some(Estimate {
             value: self.median_adu_s,
-            sigma: self.mean_adu_s.sigma?.hypot(of_median),
+            sigma: libm::hypot(self.mean_adu_s.sigma?, of_median),
         })
     }
 }

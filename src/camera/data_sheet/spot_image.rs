@@ -147,7 +147,10 @@ impl SpotImage {
     /// Radius of the circle about the star with all of its light, in samples.
     pub fn reach(&self) -> f64 {
         let side = |centre: f64, side: usize| centre.max(side as f64 - centre);
-        side(self.centre[0], self.columns).hypot(side(self.centre[1], self.rows))
+        libm::hypot(
+            side(self.centre[0], self.columns),
+            side(self.centre[1], self.rows),
+        )
     }
 
     /// Light above and left of a place, in samples from the upper left corner.

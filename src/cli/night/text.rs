@@ -60,7 +60,11 @@ pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = Shown> {
     let all = [
         ("zenith", of.zenith_mag_arcsec2, "mag/arcsec²"),
         ("limit", of.limit_vmag, "V"),
-        ("measured minus expected limit", of.limit_difference_mag, "mag"),
+        (
+            "measured minus expected limit",
+            of.limit_difference_mag,
+            "mag",
+        ),
         ("extinction", extinction, "mag per airmass"),
         ("clouds", cloud_percent, "%"),
     ];

@@ -64,14 +64,14 @@ impl CensoredNoise {
         let rounded_curvature = curvature
             + 4.0 * rounding * t * slope
             + 2.0 * rounding * (1.0 + 2.0 * rounding * t * t);
-        let log_rest = mean * t + (0.5 + rounding) * t * t + beyond.ln();
-        let log_lowest = normal_cdf(depth).ln();
+        let log_rest = mean * t + (0.5 + rounding) * t * t + libm::log(beyond);
+        let log_lowest = libm::log(normal_cdf(depth));
         let highest = log_rest.max(log_lowest);
-        let sum = (log_rest - highest).exp() + (log_lowest - highest).exp();
-        let part = (log_rest - highest).exp() / sum;
+        let sum = libm::exp(log_rest - highest) + libm::exp(log_lowest - highest);
+        let part = libm::exp(log_rest - highest) / sum;
         let first = part * rounded_slope;
         [
-            highest + sum.ln(),
+            highest + libm::log(sum),
             first,
             (part * rounded_curvature - first * first).max(f64::MIN_POSITIVE),
         ]

@@ -45,9 +45,9 @@ impl RawPeak {
         let above = |x: usize, y: usize| f64::from(view.at(x, y) - self.background_adu);
         let (x, y) = (self.x, self.y);
         let top = above(x, y);
-        let log = |x, y| above(x, y).max(1e-3 * top).ln();
+        let log = |x, y| libm::log(above(x, y).max(1e-3 * top));
         let drop =
-            top.ln() - 0.25 * (log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1));
+            libm::log(top) - 0.25 * (log(x - 1, y) + log(x + 1, y) + log(x, y - 1) + log(x, y + 1));
         let variance = 0.5 / drop.max(1e-3) - PIXEL_VARIANCE_PX2;
         variance.max(0.0).sqrt().clamp(0.35, 4.0)
     }

@@ -40,7 +40,7 @@ impl Region {
         let (x, y) = (x / w, y / w);
         let (xx, yy, xy) = (xx / w - x * x, yy / w - y * y, xy / w - x * y);
         let mean = 0.5 * (xx + yy);
-        let half_range = (0.5 * (xx - yy)).hypot(xy);
+        let half_range = libm::hypot(0.5 * (xx - yy), xy);
         let minor_px2 = mean - half_range + PIXEL_VARIANCE_PX2;
         Self {
             area_px: count,

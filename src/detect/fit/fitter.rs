@@ -294,8 +294,10 @@ impl Fitter {
                 xy += above * dx * dy;
             }
         }
-        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-        angle.is_finite().then(|| (angle.cos(), angle.sin()))
+        let angle = 0.5 * libm::atan2(2.0 * xy, xx - yy);
+        angle
+            .is_finite()
+            .then(|| (libm::cos(angle), libm::sin(angle)))
     }
 
     /// Factors of the normal equations of one spot at `fit`, its light and the pixels; `None` where

@@ -64,7 +64,7 @@ impl Core {
         Some(Self {
             x: peak.x as f64 + light_x / light,
             y: peak.y as f64 + light_y / light,
-            sigma_px: of_pixels.hypot(of_noise),
+            sigma_px: libm::hypot(of_pixels, of_noise),
             area_px,
             covariance,
         })

@@ -128,7 +128,7 @@ pub(crate) fn clamp_to_frame(spot: &mut SpotEstimate, width: usize, height: usiz
     let clamp = |at: &mut f64, sigma: &mut f64, side: usize| {
         let inside = at.clamp(-0.5, side as f64 - 0.5);
         if *at != inside {
-            *sigma = sigma.hypot(*at - inside);
+            *sigma = libm::hypot(*sigma, *at - inside);
             *at = inside;
         }
     };

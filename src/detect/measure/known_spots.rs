@@ -122,7 +122,7 @@ impl PeakSurroundings<'_> {
 
     /// Whether another peak is within `reach_px` of a spot, and closer to it than this peak.
     pub fn has_other_at(&self, spot: SpotEstimate, reach_px: f64) -> bool {
-        let distance = |peak: &Peak| (peak.x as f64 - spot.x).hypot(peak.y as f64 - spot.y);
+        let distance = |peak: &Peak| libm::hypot(peak.x as f64 - spot.x, peak.y as f64 - spot.y);
         let nearest_px = distance(self.peak()).min(reach_px);
         let mut others = self.near.iter().map(|&other| &self.peaks[other as usize]);
         others.any(|other| distance(other) < nearest_px)

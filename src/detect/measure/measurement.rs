@@ -293,13 +293,14 @@ impl Measurement<'_> {
             centroid::grey_weighted(&self.maps, &self.noise, fit, &mut centred, buffers);
             // The window cuts off its ends at whole pixels.
             for sigma in [&mut centred.sigma_x_px, &mut centred.sigma_y_px] {
-                *sigma = sigma.hypot(PIXEL_VARIANCE_PX2.sqrt());
+                *sigma = libm::hypot(*sigma, PIXEL_VARIANCE_PX2.sqrt());
             }
         }
         let error_px = |d: &Detection| d.sigma_x_px.max(d.sigma_y_px);
         let distance_px = centred.position.distance_to(&detection.position);
         let fit_error_px = error_px(detection);
-        let is_off = distance_px > SIGNIFICANT_SIGMA * fit_error_px.hypot(error_px(&centred));
+        let is_off =
+            distance_px > SIGNIFICANT_SIGMA * libm::hypot(fit_error_px, error_px(&centred));
         if is_off || self.shape.is_long() || !fit_error_px.is_finite() {
             *detection = centred;
         }
@@ -322,15 +323,15 @@ impl Measurement<'_> {
         let [major_px, minor_px] = StarShape::default().axes_px(core.covariance);
         let is_compact = major_px < MAX_ELONGATION * minor_px;
         let spot = &mut fit.spots[0];
-        let distance_px = (core.x - spot.x).hypot(core.y - spot.y);
-        let error_px = core.sigma_px.hypot(spot.sigma_x.max(spot.sigma_y));
+        let distance_px = libm::hypot(core.x - spot.x, core.y - spot.y);
+        let error_px = libm::hypot(core.sigma_px, spot.sigma_x.max(spot.sigma_y));
         let is_off = distance_px > SIGNIFICANT_SIGMA * error_px;
         if is_wide && is_compact && is_off {
             (spot.x, spot.y) = (core.x, core.y);
             // The centre depends on the level by about the distance of the two.
             let uncertain_px = distance_px * PIXEL_VARIANCE_PX2.sqrt();
             // Not that of noise, for which errors are raised where it is correlated.
-            let sigma_px = core.sigma_px.hypot(uncertain_px);
+            let sigma_px = libm::hypot(core.sigma_px, uncertain_px);
             let correlation = self.maps.position_correlation_at(spot.x, spot.y);
             [spot.sigma_x, spot.sigma_y] = correlation.map(|correlation| sigma_px / correlation);
         }

@@ -157,7 +157,7 @@ impl PairFitter<'_> {
         let is_real = |s: SpotEstimate| {
             s.flux > MIN_FLUX_SIGMA * s.sigma_flux && s.has_position(self.maps.spot_px)
         };
-        let separation_px = (a.x - b.x).hypot(a.y - b.y);
+        let separation_px = libm::hypot(a.x - b.x, a.y - b.y);
         let is_good = fit.chi2 < PairCriteria::MAX_CHI2 * fit.degrees_of_freedom.max(1.0);
         let is_apart = separation_px > self.maps.width_px();
         fit.converged && is_real(a) && is_real(b) && is_good && is_apart

@@ -181,7 +181,7 @@ pub(super) fn is_trail(
     };
     // A filtered star falls to the threshold at r² = 4 s² ln(snr / threshold); 1.5 px for the grid.
     let height = (f64::from(peak.snr) / threshold).max(1.0);
-    let radius_px = 2.0 * maps.width_px() * height.ln().sqrt() + 1.5;
+    let radius_px = 2.0 * maps.width_px() * libm::log(height).sqrt() + 1.5;
     let [major_px, minor_px] = shape.axes_px(region.covariance);
     let is_long = major_px > MIN_LENGTH * 0.5 * radius_px;
     is_long && major_px > MIN_ELONGATION * minor_px && !(peak.saturated && has_round_core())

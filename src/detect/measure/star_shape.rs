@@ -56,10 +56,11 @@ impl StarShape {
             values[values.len() / 2]
         };
         let ellipticity = [0, 1].map(|i| median(&|star| shapes[star][i]));
-        let is_alike =
-            |s: &&[f64; 2]| (s[0] - ellipticity[0]).hypot(s[1] - ellipticity[1]) < MAX_DEVIATION;
+        let is_alike = |s: &&[f64; 2]| {
+            libm::hypot(s[0] - ellipticity[0], s[1] - ellipticity[1]) < MAX_DEVIATION
+        };
         let alike = shapes.iter().filter(is_alike).count();
-        let are_elongated = ellipticity[0].hypot(ellipticity[1]) > MIN_ELLIPTICITY;
+        let are_elongated = libm::hypot(ellipticity[0], ellipticity[1]) > MIN_ELLIPTICITY;
         let elongation = Elongation {
             ellipticity,
             area_px: median(&|star| cores[star].area_px),
@@ -74,7 +75,8 @@ impl StarShape {
     pub fn is_long(&self) -> bool {
         /// Axes in a ratio of 2.4.
         const LONG_ELLIPTICITY: f64 = 0.7;
-        let is_long = |e: Elongation| e.ellipticity[0].hypot(e.ellipticity[1]) > LONG_ELLIPTICITY;
+        let is_long =
+            |e: Elongation| libm::hypot(e.ellipticity[0], e.ellipticity[1]) > LONG_ELLIPTICITY;
         self.elongation.is_some_and(is_long)
     }
 

@@ -81,14 +81,14 @@ impl FieldFrame {
         let [width, height] = size.sides().map(|side| side as f64);
         Self {
             centre_px: [0.5 * (width - 1.0), 0.5 * (height - 1.0)],
-            radius_px: 0.5 * width.hypot(height),
+            radius_px: 0.5 * libm::hypot(width, height),
         }
     }
 
     /// Distance from the centre at a pixel, at most that of the corners: 1.
     pub fn distance(&self, x_px: f64, y_px: f64) -> f64 {
         let [_, x, y, ..] = self.terms(x_px, y_px);
-        x.hypot(y).min(1.0)
+        libm::hypot(x, y).min(1.0)
     }
 
     /// Values of the terms of the polynomials at a pixel.
@@ -187,7 +187,7 @@ impl EffectivePsf {
         Self {
             lobes: vec![lobe],
             form: FieldForm::Symmetric,
-            typical: [spot_px.ln(), 0.0, 0.0],
+            typical: [libm::log(spot_px), 0.0, 0.0],
             moments,
             spot_px,
             radius_px,
@@ -213,9 +213,9 @@ impl EffectivePsf {
             is_comatic: self.form == FieldForm::Radial,
         };
         everywhere.fold(start, |psf, [ln_sigma, e1, e2]| {
-            let ([least, largest], sigma_px) = (psf.sigma_range_px, ln_sigma.exp());
+            let ([least, largest], sigma_px) = (psf.sigma_range_px, libm::exp(ln_sigma));
             MeasuredPsf {
-                axis_ratio: psf.axis_ratio.max(e1.hypot(e2).exp()),
+                axis_ratio: psf.axis_ratio.max(libm::exp(libm::hypot(e1, e2))),
                 sigma_range_px: [least.min(sigma_px), largest.max(sigma_px)],
                 ..psf
             }
@@ -246,7 +246,7 @@ impl EffectivePsf {
         let mut outward = 0.0;
         if self.form == FieldForm::Radial {
             let [_, x, y, ..] = self.moments.frame.terms(x_px, y_px);
-            outward = x.hypot(y).min(1.0);
+            outward = libm::hypot(x, y).min(1.0);
             let [cos, sin] = if outward > 0.0 {
                 [x / outward, y / outward]
             } else {
@@ -254,7 +254,7 @@ impl EffectivePsf {
             };
             stretch = product(stretch, [[cos, -sin], [sin, cos]]);
         }
-        let scale = (here[0] - self.typical[0]).exp();
+        let scale = libm::exp(here[0] - self.typical[0]);
         local.lobes.clear();
         local.lobes.extend(self.lobes.iter().map(|of_field| {
             let Lobe {
@@ -283,7 +283,7 @@ pub(crate) type Matrix = [[f64; 2]; 2];
 
 /// Covariance of a spot, in px².
 pub(crate) fn covariance([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
-    scaled_exponential((2.0 * ln_sigma).exp(), [e1, e2])
+    scaled_exponential(libm::exp(2.0 * ln_sigma), [e1, e2])
 }
 
 /// Derivatives of the covariance with respect to the moments: of xx, yy and xy.
@@ -324,19 +324,20 @@ pub(crate) fn inverse([[xx, xy], [_, yy]]: Matrix) -> Matrix {
 
 /// The symmetric square root of the covariance.
 fn root([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
-    scaled_exponential(ln_sigma.exp(), [0.5 * e1, 0.5 * e2])
+    scaled_exponential(libm::exp(ln_sigma), [0.5 * e1, 0.5 * e2])
 }
 
 /// Its inverse.
 fn inverse_root([ln_sigma, e1, e2]: SpotMoments) -> Matrix {
-    scaled_exponential((-ln_sigma).exp(), [-0.5 * e1, -0.5 * e2])
+    scaled_exponential(libm::exp(-ln_sigma), [-0.5 * e1, -0.5 * e2])
 }
 
 /// `scale · exp(e₁ K + e₂ L)`.
 fn scaled_exponential(scale: f64, [e1, e2]: [f64; 2]) -> Matrix {
-    let e = e1.hypot(e2);
-    let sinh_per_e = if e > 0.0 { e.sinh() / e } else { 1.0 };
-    let [cosh, plus, cross] = [e.cosh(), sinh_per_e * e1, sinh_per_e * e2].map(|part| scale * part);
+    let e = libm::hypot(e1, e2);
+    let sinh_per_e = if e > 0.0 { libm::sinh(e) / e } else { 1.0 };
+    let [cosh, plus, cross] =
+        [libm::cosh(e), sinh_per_e * e1, sinh_per_e * e2].map(|part| scale * part);
     [[cosh + plus, cross], [cross, cosh - plus]]
 }
 

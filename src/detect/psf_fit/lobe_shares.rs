@@ -46,9 +46,9 @@ pub(super) struct LobeGrid {
 impl LobeGrid {
     /// For spots of these moments.
     pub fn of(typical: SpotMoments) -> Self {
-        let elongation = typical[1].hypot(typical[2]);
-        let minor_px = (typical[0] - 0.5 * elongation).exp();
-        let ratio = elongation.exp();
+        let elongation = libm::hypot(typical[1], typical[2]);
+        let minor_px = libm::exp(typical[0] - 0.5 * elongation);
+        let ratio = libm::exp(elongation);
         let area_px2 = std::f64::consts::PI * REACH_SIGMAS.powi(2) * ratio * minor_px.powi(2);
         let wanted_px = (LOBE_SIZE * minor_px).min(MAX_LOBE_PX);
         let least_px = (area_px2 / MAX_LOBES).sqrt() / PITCH;
@@ -78,7 +78,8 @@ impl LobeGrid {
         let distance = |lobe: &Lobe| square(density, lobe.offset_px).sqrt();
         let distances: Vec<f64> = lobes.iter().map(distance).collect();
         let class_of = |image: fn([f64; 2]) -> [f64; 2]| -> Vec<usize> {
-            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 0.1 * pitch_px;
+            let near =
+                |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 0.1 * pitch_px;
             let class = |(number, lobe): (usize, &Lobe)| {
                 let at = image(lobe.offset_px);
                 let is_same = |other: &Lobe| near(other.offset_px, at);
@@ -117,7 +118,7 @@ impl LobeGrid {
 
     /// The shares of a Gaussian, which are expected before the stars tell.
     fn expected_shares(&self) -> Vec<f64> {
-        let share = |sigmas: &f64| (-0.5 * sigmas * sigmas).exp();
+        let share = |sigmas: &f64| libm::exp(-0.5 * sigmas * sigmas);
         let mut shares: Vec<f64> = self.distances.iter().map(share).collect();
         let sum: f64 = shares.iter().sum();
         shares.iter_mut().for_each(|share| *share /= sum);

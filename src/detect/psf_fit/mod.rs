@@ -66,7 +66,7 @@ pub(crate) fn measure_psf(
     let variance = |noise: NoiseModel| light * (noise.shot_adu + noise.model_error2 * light);
     let ratio = variance(noise) / variance(round);
     let [_, e1, e2] = grid.typical;
-    let is_other_form = settled.is_varied || e1.hypot(e2) > MIN_ELONGATION;
+    let is_other_form = settled.is_varied || libm::hypot(e1, e2) > MIN_ELONGATION;
     let is_needed = ratio < MAX_VARIANCE_RATIO || (is_other_form && ratio < 1.0);
     is_needed.then(|| {
         model.noise = noise;

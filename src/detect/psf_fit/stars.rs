@@ -460,7 +460,7 @@ fn first_fit(
     if !is_whole || window.pixels_adu().any(|(.., value)| value.is_nan()) {
         return None;
     }
-    let ln_spot = maps.spot_px.ln();
+    let ln_spot = libm::log(maps.spot_px);
     let mut star = PsfStar {
         window,
         spot,
@@ -480,10 +480,10 @@ fn first_fit(
         let by_size = by_size.clamp(-0.3, 0.3);
         let [e1, e2] = [e1, e2].map(|e| e.clamp(-MAX_ELONGATION, MAX_ELONGATION));
         star.moments = [star.moments[0] + by_size, e1, e2];
-        let distance = (star.spot.x - before.x).hypot(star.spot.y - before.y);
+        let distance = libm::hypot(star.spot.x - before.x, star.spot.y - before.y);
         moved = distance.max(by_size.abs());
     }
-    let is_near = (star.spot.x - spot.x).hypot(star.spot.y - spot.y) < 1.0 + maps.spot_px;
+    let is_near = libm::hypot(star.spot.x - spot.x, star.spot.y - spot.y) < 1.0 + maps.spot_px;
     let is_finite = star.moments.iter().all(|moment| moment.is_finite());
     let is_star = moved < MAX_LAST_STEP && is_near && is_finite && star.spot.flux > 0.0;
     is_star.then_some(star)
@@ -505,7 +505,7 @@ fn keep_alike(stars: &mut Vec<PsfStar>) {
     let size = median_of(&|star| star.moments[0]);
     let chi2 = median_of(&|star| star.chi2);
     stars.retain(|star| {
-        let is_alike = (star.moments[0] - size).abs() < SIZE_FACTOR.ln();
+        let is_alike = (star.moments[0] - size).abs() < libm::log(SIZE_FACTOR);
         is_alike && star.chi2 < CHI2_FACTOR * chi2.max(1.0)
     });
 }

@@ -71,7 +71,7 @@ impl BrightPeak for Peak {
         let Some((value, around)) = self.values else {
             return filter_px;
         };
-        let log = |value: f32| f64::from(value.max(1e-3)).ln();
+        let log = |value: f32| libm::log(f64::from(value.max(1e-3)));
         let drop = log(value) - 0.25 * around.into_iter().map(log).sum::<f64>();
         let variance = 0.5 / drop.max(1e-3) - filter_px * filter_px - 2.0 * PIXEL_VARIANCE_PX2;
         variance.max(0.0).sqrt().clamp(0.35, 6.0)

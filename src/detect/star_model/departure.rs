@@ -91,7 +91,7 @@ impl CommonElongation {
     fn exceeds(&self, limit: f64) -> bool {
         let [e1, e2] = self.sums.map(|[score, information]| score / information);
         let information = self.sums[0][1].min(self.sums[1][1]);
-        let e = e1.hypot(e2);
+        let e = libm::hypot(e1, e2);
         e > limit && e > SIGNIFICANT_SIGMA / information.sqrt()
     }
 
@@ -127,7 +127,7 @@ pub(super) fn is_departure(
 fn have_scattered_sizes(stars: &[Fit], spot_px: f64) -> bool {
     /// Sizes beyond this factor of the frame's are not of stars.
     const MAX_FACTOR: f64 = MODE_WIDTH * MODE_WIDTH;
-    let is_star = |fit: &&Fit| (fit.spot_px / spot_px).ln().abs() < MAX_FACTOR.ln();
+    let is_star = |fit: &&Fit| libm::log(fit.spot_px / spot_px).abs() < libm::log(MAX_FACTOR);
     let stars = stars.iter().filter(is_star);
     let scatter = MIN_SIZE_SCATTER * spot_px;
     let Some(mean_px) = weighted_size(stars.clone()) else {

@@ -48,7 +48,7 @@ pub(crate) fn star_model(
     buffers: &mut FitBuffers,
 ) -> StarModel {
     let of_all_sizes = stars.clone();
-    stars.retain(|fit| (fit.spot_px / maps.spot_px).ln().abs() < MODE_WIDTH.ln());
+    stars.retain(|fit| libm::log(fit.spot_px / maps.spot_px).abs() < libm::log(MODE_WIDTH));
     // The start must not have too little noise: else a fit follows the brightest pixel wherever it
     // is.
     let brightest = stars.first().map(|fit| fit.spots[0]);

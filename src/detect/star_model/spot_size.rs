@@ -79,12 +79,12 @@ fn densest_cluster(sorted: &[Size]) -> f64 {
     /// Narrower clusters are no denser: sizes have errors, as a ratio.
     const MIN_RATIO: f64 = 1.1;
     let count: f64 = sorted.iter().map(|size| size.weight).sum();
-    let range = (SPOT_RANGE_PX.1 / HOT_PIXEL_PX).ln();
+    let range = libm::log(SPOT_RANGE_PX.1 / HOT_PIXEL_PX);
     // The log likelihood ratio of a cluster in this share of the range.
     let surplus = |members: f64, share: f64| {
         let term = |n: f64, share: f64| {
             if n > 0.0 {
-                n * (n / (count * share)).ln()
+                n * libm::log(n / (count * share))
             } else {
                 0.0
             }
@@ -100,7 +100,7 @@ fn densest_cluster(sorted: &[Size]) -> f64 {
             if ratio > MODE_WIDTH * MODE_WIDTH {
                 break;
             }
-            let share = ratio.max(MIN_RATIO).ln() / range;
+            let share = libm::log(ratio.max(MIN_RATIO)) / range;
             let of_cluster = surplus(members, share);
             // Fewer than expected are no cluster.
             if members > count * share && of_cluster > most {

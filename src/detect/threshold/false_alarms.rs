@@ -33,10 +33,10 @@ struct BothLower {
 impl BothLower {
     fn new(rho: f64) -> Self {
         let h = ((1.0 - rho) / (1.0 + rho)).sqrt();
-        let alpha = ((1.0 - rho * rho) / 2.0).sqrt().asin();
+        let alpha = libm::asin(((1.0 - rho * rho) / 2.0).sqrt());
         // Midpoint rule: the integrand vanishes with all its derivatives at 0.
         let step = alpha / PARTS as f64;
-        let exponent = |i: usize| 0.5 * (h / ((i as f64 + 0.5) * step).sin()).powi(2);
+        let exponent = |i: usize| 0.5 * (h / libm::sin((i as f64 + 0.5) * step)).powi(2);
         Self {
             h,
             step,
@@ -90,13 +90,10 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
     const TOLERANCE: f64 = 1e-4;
     /// The logarithm of the rate falls at least this much with u².
     const MIN_SLOPE: f64 = -0.1;
-    let wanted = (per_mpx * 1e-6).ln();
+    let wanted = libm::log(per_mpx * 1e-6);
     let (across, down) = (BothLower::new(rho_x), BothLower::new(rho_y));
     let excess = |u: f64| {
-        false_alarm_probability(u, &across, &down)
-            .max(f64::MIN_POSITIVE)
-            .ln()
-            - wanted
+        libm::log(false_alarm_probability(u, &across, &down).max(f64::MIN_POSITIVE)) - wanted
     };
     // The rate falls about as exp(−u²/2): its logarithm is nearly linear in u², and secants
     // converge fast.
@@ -121,7 +118,7 @@ pub(crate) fn threshold_for_rate(per_mpx: f64, rho_x: f64, rho_y: f64) -> f64 {
 /// `t² = ν(exp(u²/ν) − 1)`.
 pub(crate) fn for_estimated_noise(u: f64, degrees: f64) -> f64 {
     let exponent = (u * u / degrees).min(20.0);
-    (degrees * exponent.exp_m1()).sqrt()
+    (degrees * libm::expm1(exponent)).sqrt()
 }
 
 #[cfg(test)]

@@ -61,7 +61,7 @@ impl FilterWeights {
     ) -> Option<f64> {
         let (inside, at_border) = (quantile(&self.inside)?, quantile(&self.at_border)?);
         let raise = (at_border + shift - inside).min(Self::MAX_BORDER_RAISE);
-        Some(inside + (self.border_part * (u * raise).exp_m1()).ln_1p() / u)
+        Some(inside + libm::log1p(self.border_part * libm::expm1(u * raise)) / u)
     }
 }
 

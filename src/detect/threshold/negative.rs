@@ -181,8 +181,8 @@ impl Sides {
         };
         let (near, far) = (negative_at(SCALE_PER_MPX)?, negative_at(TAIL_PER_MPX)?);
         // As a Gaussian has it: the logarithm of the number is linear in the square of the height.
-        let slope = (far.powi(2) - near.powi(2)) / (SCALE_PER_MPX / TAIL_PER_MPX).ln();
-        let square = far.powi(2) + slope * (TAIL_PER_MPX / per_mpx).ln();
+        let slope = (far.powi(2) - near.powi(2)) / libm::log(SCALE_PER_MPX / TAIL_PER_MPX);
+        let square = far.powi(2) + slope * libm::log(TAIL_PER_MPX / per_mpx);
         let tail = square.max(0.0).sqrt() / near;
         let count = SCALE_PER_MPX * megapixels;
         // Mostly, few maxima are stars. Else all are sorted, which takes long.

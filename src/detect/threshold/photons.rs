@@ -34,7 +34,7 @@ pub(crate) fn threshold_for_photons(u: f64, skewness: f64, filter: &FilterWeight
     let step = CumulantTable::step_for(filter);
     let cumulants = |i: usize| {
         let st = skewness * step * i as f64;
-        let above = st.exp_m1();
+        let above = libm::expm1(st);
         [
             (above - st) / (skewness * skewness),
             above / skewness,
@@ -93,7 +93,7 @@ pub(crate) fn photon_skewness(
     let variance = square - mean * mean;
     let own = cube - 3.0 * mean * square + 2.0 * mean.powi(3);
     let of_neighbors = mixed - mean * square - 2.0 * mean * product + 2.0 * mean.powi(3);
-    let skewness = (own - own_per_mixed(spot_px) * of_neighbors) / variance.powf(1.5);
+    let skewness = (own - own_per_mixed(spot_px) * of_neighbors) / libm::pow(variance, 1.5);
     let is_independent = product - mean * mean < MAX_CORRELATION * variance;
     (is_independent && skewness.is_finite()).then_some(skewness)
 }

@@ -107,7 +107,7 @@ impl PixelNoise {
         for (i, (term, &n)) in terms.iter_mut().zip(&self.counts).enumerate() {
             if n > 0.0 {
                 let x = (bin_center(i) - self.mean) / self.sigma;
-                *term = [x, n / self.count, (step * x).exp()];
+                *term = [x, n / self.count, libm::exp(step * x)];
             }
         }
         CumulantTable::new(step, |_| {
@@ -119,7 +119,7 @@ impl PixelNoise {
                 *part *= *factor;
             }
             let slope = first / zeroth;
-            [zeroth.ln(), slope, second / zeroth - slope * slope]
+            [libm::log(zeroth), slope, second / zeroth - slope * slope]
         })
     }
 
@@ -162,7 +162,7 @@ impl PixelNoise {
         let per_kurtosis = (u.powi(3) - 3.0 * u) / 24.0 - SIGMA_PER_KURTOSIS * u;
         let of_skewness = per_skewness * cubes * (6.0 / self.count).sqrt();
         let of_kurtosis = per_kurtosis * fourths * (24.0 / self.count).sqrt();
-        of_skewness.hypot(of_kurtosis)
+        libm::hypot(of_skewness, of_kurtosis)
     }
 }
 

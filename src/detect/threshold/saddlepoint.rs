@@ -105,7 +105,7 @@ pub(crate) fn saddlepoint_quantile(
     let quantile = |t: f64| {
         let [k, slope, curvature] = filtered(t);
         let w = (2.0 * (t * slope - k)).max(1e-9).sqrt();
-        w + (t * curvature.max(1e-9).sqrt() / w).ln() / w
+        w + libm::log(t * curvature.max(1e-9).sqrt() / w) / w
     };
     let (mut low, mut high) = T_RANGE;
     if quantile(high) < u {

@@ -60,7 +60,7 @@ impl Bar {
         let excess = excess.max(1.0);
         let (mut total, mut mean, mut square) = (0.0, 0.0, 0.0);
         for i in 0..=tries {
-            let likelihood = ((gains[i] - gains[best]) / excess).exp();
+            let likelihood = libm::exp((gains[i] - gains[best]) / excess);
             total += likelihood;
             mean += likelihood * along_px(i);
             square += likelihood * along_px(i) * along_px(i);

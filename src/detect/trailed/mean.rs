@@ -105,7 +105,7 @@ impl MeanProfile {
             light,
             middle: middle + 0.5 * (right - left) - first as f64,
             length_px: left + right,
-            middle_sigma_px: MIN_SIGMA_PX.hypot(0.5 * moved_px),
+            middle_sigma_px: libm::hypot(MIN_SIGMA_PX, 0.5 * moved_px),
         })
     }
 

@@ -122,8 +122,8 @@ impl PlacedBar {
         let mut spot = SpotEstimate {
             x,
             y,
-            sigma_x: (bar.sigma_along_px * cos).hypot(bar.sigma_across_px * sin),
-            sigma_y: (bar.sigma_along_px * sin).hypot(bar.sigma_across_px * cos),
+            sigma_x: libm::hypot(bar.sigma_along_px * cos, bar.sigma_across_px * sin),
+            sigma_y: libm::hypot(bar.sigma_along_px * sin, bar.sigma_across_px * cos),
             ..SpotEstimate::default()
         };
         clamp_to_frame(&mut spot, view.width, view.height);

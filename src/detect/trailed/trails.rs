@@ -53,8 +53,8 @@ impl Trails {
         let aligned: ArrayVec<&LargeRegion<'_>, MAX> =
             long.iter().filter(is_aligned).copied().collect();
         // Twice the direction's angle is that of the ellipticity.
-        let half_angle = 0.5 * doubled[1].atan2(doubled[0]);
-        let direction = [half_angle.cos(), half_angle.sin()];
+        let half_angle = 0.5 * libm::atan2(doubled[1], doubled[0]);
+        let direction = [libm::cos(half_angle), libm::sin(half_angle)];
         if aligned.len() < fewest || lines(&aligned, direction) < MIN.max(aligned.len() / 2) {
             return None;
         }
@@ -87,7 +87,7 @@ impl Trails {
         let [cos, sin] = self.shape.direction;
         StarTrails {
             // y points down; angles are counted as seen.
-            angle_rad: (-sin).atan2(cos),
+            angle_rad: libm::atan2(-sin, cos),
             length_px: self.shape.length_px,
             middle_sigma_px: self
                 .template
@@ -112,7 +112,7 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
                 reach_px: 1.5 * shape.length_px,
             };
             profile.measure(maps, &strip);
-            Bar::fit(&profile, &shape, None, 0.0).map(|bar| bar.gain.ln())
+            Bar::fit(&profile, &shape, None, 0.0).map(|bar| libm::log(bar.gain))
         });
         gains.sum()
     };
@@ -134,7 +134,7 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
     for round in 0..ROUNDS {
         // At first the regions may be pieces, or of several stars.
         let step = if round == 0 { 0.06 } else { 0.01 };
-        let mut lengths = (-10..=20).map(|i| stretched(shape, (step * f64::from(i)).exp()));
+        let mut lengths = (-10..=20).map(|i| stretched(shape, libm::exp(step * f64::from(i))));
         shape = best_of(shape, &mut lengths);
         shape = turned(shape, median_slope(maps, regions, &shape));
         let mut breadths = (2..=12).map(|step| Shape {
@@ -149,7 +149,7 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
 /// A shape turned by an angle in radians.
 fn turned(shape: Shape, angle: f64) -> Shape {
     let [cos, sin] = shape.direction;
-    let (s, c) = angle.sin_cos();
+    let (s, c) = libm::sincos(angle);
     Shape {
         direction: [cos * c - sin * s, sin * c + cos * s],
         ..shape
@@ -206,7 +206,7 @@ fn doubled_direction(region: &Region) -> [f64; 2] {
 }
 
 fn unit([x, y]: [f64; 2]) -> [f64; 2] {
-    let length = x.hypot(y).max(f64::MIN_POSITIVE);
+    let length = libm::hypot(x, y).max(f64::MIN_POSITIVE);
     [x / length, y / length]
 }
 

@@ -198,7 +198,7 @@ impl<'a> Band<'a> {
     fn turn(&mut self, place_px: f64, slope: f64) {
         let [x, y] = self.along;
         self.at = [self.at[0] - place_px * y, self.at[1] + place_px * x];
-        let length = slope.hypot(1.0);
+        let length = libm::hypot(slope, 1.0);
         self.along = [(x - slope * y) / length, (y + slope * x) / length];
     }
 
@@ -207,7 +207,7 @@ impl<'a> Band<'a> {
         let reach_px = 4.0 * self.sigma_px;
         let side_px = 6.0 * self.sigma_px.max(1.0);
         let view = self.search.view;
-        let diagonal_px = (view.width as f64).hypot(view.height as f64);
+        let diagonal_px = libm::hypot(view.width as f64, view.height as f64);
         let inside = |t: f64| {
             let point = self.point(t);
             let (x, y) = (point.x, point.y);

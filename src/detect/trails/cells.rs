@@ -207,7 +207,7 @@ impl CellMap {
                 } else {
                     0.0
                 };
-                if (x - along * dx).hypot(y - along * dy) < reach_px {
+                if libm::hypot(x - along * dx, y - along * dy) < reach_px {
                     act(self, row * self.columns + column);
                 }
             }
@@ -221,7 +221,7 @@ impl CellMap {
 
     /// Whether a line still stands out.
     pub fn is_significant(&self, line: &Line, false_alarms: f64) -> bool {
-        self.log10_false_alarm(line.in_pixels(self.side_px)) <= false_alarms.log10()
+        self.log10_false_alarm(line.in_pixels(self.side_px)) <= libm::log10(false_alarms)
     }
 
     /// Decimal logarithm of the number of lines in noise that stand out as much as the cells along one
@@ -243,7 +243,7 @@ impl CellMap {
         };
         let noise = if scatter > MAX_SCATTER { scatter } else { 1.0 };
         let snr = self.snr_of(ends_px, 0.0).unwrap_or(0.0) / noise;
-        radon::log10_tail(snr) + (radon::lines_of(self.columns, self.rows) as f64).log10()
+        radon::log10_tail(snr) + libm::log10(radon::lines_of(self.columns, self.rows) as f64)
     }
 
     /// Sum of the cells along a line, moved across by so many cells, over its standard deviation in noise;
@@ -253,7 +253,7 @@ impl CellMap {
         let cell = |px: f64| (px + 0.5) / side_px - 0.5;
         let [x0, y0, x1, y1] = [begin.x, begin.y, end.x, end.y].map(cell);
         let (dx, dy) = (x1 - x0, y1 - y0);
-        let across = [-dy, dx].map(|part| shift * part / dx.hypot(dy));
+        let across = [-dy, dx].map(|part| shift * part / libm::hypot(dx, dy));
         let steps = dx.abs().max(dy.abs()).round().max(1.0) as usize;
         let value = |step: usize| {
             let part = step as f64 / steps as f64;

@@ -131,7 +131,7 @@ impl TrailSearch<'_> {
         let [one, other] = ridge.ends_px;
         let length_px = one.distance_to(&other);
         let slant_px = (one.x - other.x).abs().min((one.y - other.y).abs());
-        let is_trail = log10_false_alarm <= FALSE_TRAILS_PER_FRAME.log10()
+        let is_trail = log10_false_alarm <= libm::log10(FALSE_TRAILS_PER_FRAME)
             && WIDTHS.contains(&(ridge.width_sigma_px / self.spot_px))
             && ridge.snr >= MIN_SNR
             && slant_px >= MIN_SLANT_PX

@@ -47,7 +47,7 @@ pub(super) fn log10_tail(snr: f64) -> f64 {
     if snr < 1.0 {
         return 0.0;
     }
-    -(0.5 * snr * snr + (snr * (2.0 * PI).sqrt()).ln()) / LN_10
+    -(0.5 * snr * snr + libm::log(snr * (2.0 * PI).sqrt())) / LN_10
 }
 
 /// The lines that stand out: of each strip of rows or columns the strongest, strongest first. In a map of
@@ -57,7 +57,7 @@ pub(super) fn significant_lines(
     values: &[f32],
     false_alarms: f64,
 ) -> Vec<Line> {
-    let log10_limit = (false_alarms / lines_of(columns, rows) as f64).log10();
+    let log10_limit = libm::log10(false_alarms / lines_of(columns, rows) as f64);
     let mut lines = Vec::new();
     for is_turned in [false, true] {
         for is_mirrored in [false, true] {

@@ -348,7 +348,7 @@ impl WindowDetector {
             sizes.extend(fit);
         });
         let mode = spot_size(&sizes)?;
-        let is_near = |fit: &&Fit| (fit.spot_px / mode.spot_px).ln().abs() < 0.25;
+        let is_near = |fit: &&Fit| libm::log(fit.spot_px / mode.spot_px).abs() < 0.25;
         weighted_size(sizes.iter().filter(is_near)).or(Some(mode.spot_px))
     }
 }
@@ -373,7 +373,7 @@ fn lobes_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
     if 2.0 * smear_variance_px2(smear_px) <= MIN_SMEAR_SHARE * width2 {
         return 0;
     }
-    let length_px = smear_px[0].hypot(smear_px[1]);
+    let length_px = libm::hypot(smear_px[0], smear_px[1]);
     let parts = (length_px / (PART_SIGMAS * model.spot_sigma_px)).ceil() as usize;
     2 * parts.clamp(1, MAX_PARTS)
 }
@@ -435,7 +435,7 @@ fn cut_out(
     window.background_noise = square.background_error_adu();
     let width2 = spot_px.powi(2) + PIXEL_VARIANCE_PX2;
     let peak = spot.flux / (std::f64::consts::TAU * width2);
-    window.background_error = window.background_noise.hypot(HALO_ERROR * peak);
+    window.background_error = libm::hypot(window.background_noise, HALO_ERROR * peak);
 }
 
 /// The star of a fit that converged; `None` if it is not a star, or not where it is expected.

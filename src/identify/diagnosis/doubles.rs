@@ -88,7 +88,7 @@ fn offsets(field: &StarField) -> Vec<Offset> {
     for (i, a) in stars.iter().enumerate() {
         for (j, b) in stars.iter().enumerate().skip(i + 1) {
             let [dx, dy] = [b.position.x - a.position.x, b.position.y - a.position.y];
-            if dx.hypot(dy) < MIN_OFFSET_PX {
+            if libm::hypot(dx, dy) < MIN_OFFSET_PX {
                 continue;
             }
             // Nearly vertical offsets must all point the same way.

@@ -96,7 +96,7 @@ fn contradiction(case: &Unidentified, priors: &Priors, found: &Identification) -
 
 /// Horizontal fields of view, in radians, of frames with these pixel scales at their centre.
 fn fields_of_view(pixel_scales_rad: [f64; 2], width_px: f64) -> [f64; 2] {
-    pixel_scales_rad.map(|pixel_rad| 2.0 * (width_px * pixel_rad / 2.0).atan())
+    pixel_scales_rad.map(|pixel_rad| 2.0 * libm::atan(width_px * pixel_rad / 2.0))
 }
 
 fn too_narrow(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {

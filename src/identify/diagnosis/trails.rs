@@ -63,17 +63,17 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
     }
     // Opposite angles are the same direction, so the angle is doubled.
     let sum = trails.iter().fold([0.0, 0.0], |[x, y], bar| {
-        let (sin, cos) = (2.0 * bar.angle_rad).sin_cos();
+        let (sin, cos) = libm::sincos(2.0 * bar.angle_rad);
         [x + cos, y + sin]
     });
-    if sum[0].hypot(sum[1]) < ALIGNMENT * count as f64 {
+    if libm::hypot(sum[0], sum[1]) < ALIGNMENT * count as f64 {
         return None;
     }
     let mut lengths: Vec<f64> = trails.iter().map(|bar| bar.length_px).collect();
     lengths.sort_by(f64::total_cmp);
     Some(Diagnosis::Trails {
         trails: count,
-        angle_rad: sum[1].atan2(sum[0]) / 2.0,
+        angle_rad: libm::atan2(sum[1], sum[0]) / 2.0,
         length_px: lengths[count / 2],
     })
 }
@@ -178,12 +178,12 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
         let (dx, dy) = (x - mean[0], y - mean[1]);
         (xx, yy, xy) = (xx + dx * dx, yy + dy * dy, xy + dx * dy);
     }
-    let (middle, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+    let (middle, half) = ((xx + yy) / 2.0, libm::hypot((xx - yy) / 2.0, xy));
     // A bar of length l has the variance l²/12 along it.
     let extent = |moment: f64| (12.0 * moment.max(0.0) / count).sqrt();
     Some(Bar {
         // y points down; angles are counted as seen.
-        angle_rad: -(2.0 * xy).atan2(xx - yy) / 2.0,
+        angle_rad: -libm::atan2(2.0 * xy, xx - yy) / 2.0,
         length_px: extent(middle + half),
         breadth_px: extent(middle - half),
     })

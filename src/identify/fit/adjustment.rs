@@ -234,7 +234,7 @@ impl Predictor {
         model: Option<DistortionModel>,
     ) {
         self.icrs_to_lens = self.icrs_to_lens.then_turn(turn);
-        let focal_length_px = self.camera.focal_length_px() * ln_ratio.exp();
+        let focal_length_px = self.camera.focal_length_px() * libm::exp(ln_ratio);
         self.set_lens(focal_length_px, self.distortion.changed(changes_px), model);
     }
 
@@ -433,7 +433,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             .distortion()
             .map_or(&[][..], Distortion::coefficients_px);
         let present_px = self.predictor.distortion.coefficients_px();
-        let ln_ratio = (lens.focal_length_px() / self.predictor.camera.focal_length_px()).ln();
+        let ln_ratio = libm::log(lens.focal_length_px() / self.predictor.camera.focal_length_px());
         // The unknowns: a change of ln f, and terms.
         let wanted: DVector<f64> = DVector::from_iterator(
             information.nrows(),

@@ -169,7 +169,7 @@ fn central_pose_by_parameters<const P: usize>(camera: &CameraModel) -> SMatrix<f
     by_parameters
         .fixed_view_mut::<3, 3>(0, 0)
         .copy_from(&to_lens.transpose());
-    let ln_central = camera.central_focal_length_px().ln();
+    let ln_central = libm::log(camera.central_focal_length_px());
     for parameter in POSE_PARAMETERS - 1..P {
         let step = match parameter.checked_sub(POSE_PARAMETERS) {
             None => STEP,
@@ -179,7 +179,7 @@ fn central_pose_by_parameters<const P: usize>(camera: &CameraModel) -> SMatrix<f
         // The lens's axes stay, so the camera's turn the other way.
         let turn = to_lens.tr_mul(&moved.lens_axes());
         let half = (turn.transpose() - turn) * 0.5;
-        let ln_ratio = moved.central_focal_length_px().ln() - ln_central;
+        let ln_ratio = libm::log(moved.central_focal_length_px()) - ln_central;
         let change = Vector4::new(half[(2, 1)], half[(0, 2)], half[(1, 0)], ln_ratio) / step;
         by_parameters.set_column(parameter, &change);
     }
@@ -194,7 +194,7 @@ fn with_step(
     step: f64,
 ) -> CameraModel {
     let Some(term) = parameter.checked_sub(POSE_PARAMETERS) else {
-        return camera.with_focal_length(camera.focal_length_px() * step.exp());
+        return camera.with_focal_length(camera.focal_length_px() * libm::exp(step));
     };
     let changes = std::iter::repeat_n(0.0, term).chain([step]);
     camera.with_distortion(Some(distortion.changed(changes)))

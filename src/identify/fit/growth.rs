@@ -206,7 +206,7 @@ impl Growth {
         };
         hypothesis.predict_at_least(problem, depth, &mut self.around, &mut self.predicted);
         let predictor = Predictor::new(&fitted.camera, &fitted.icrs_to_camera, Some(MODEL));
-        let diagonal_px = field.width_px.hypot(field.height_px);
+        let diagonal_px = libm::hypot(field.width_px, field.height_px);
         let density_px2 = field.stars.len() as f64 / (field.width_px * field.height_px);
         self.stars.clear();
         self.expected.clear();
@@ -237,7 +237,7 @@ impl Growth {
             });
             if let Some((index, distance_px)) = found {
                 let observed = &field.stars[index];
-                let sigma_px = observed.sigma_px.hypot(MIN_SIGMA_PX);
+                let sigma_px = libm::hypot(observed.sigma_px, MIN_SIGMA_PX);
                 self.stars.push(MeasuredStar {
                     pixel: observed.position,
                     icrs: star.direction,

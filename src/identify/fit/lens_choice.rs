@@ -114,8 +114,9 @@ impl Rival {
     /// # Reference
     /// Hoeting et al. 1999, Statist. Sci. 14, 382, eq. 2, for the variance between models.
     fn ln_f_variance(&self, all: &[Self]) -> f64 {
-        let weight = |rival: &Self| (0.5 * (self.misfit - rival.misfit)).exp();
-        let squared = |rival: &Self| (rival.focal_length_px / self.focal_length_px).ln().powi(2);
+        let weight = |rival: &Self| libm::exp(0.5 * (self.misfit - rival.misfit));
+        let squared =
+            |rival: &Self| libm::log(rival.focal_length_px / self.focal_length_px).powi(2);
         let weights: f64 = all.iter().map(weight).sum();
         let squares: f64 = all.iter().map(|rival| weight(rival) * squared(rival)).sum();
         squares / weights
@@ -251,7 +252,7 @@ impl LensChoice<'_> {
                     (true, true) => WORTH_A_GUESS.powi(2),
                 };
                 let worth = heavier_tails * of_guess * least_gain(model, best.0);
-                equations * (best.1 / found.left_out_chi_sq).ln() > worth
+                equations * libm::log(best.1 / found.left_out_chi_sq) > worth
             };
             let found = &predictions[model.terms()];
             if is_better(found) {
@@ -263,7 +264,7 @@ impl LensChoice<'_> {
         let penalty = model.map_or(0.0, |model| least_gain(model, None));
         Some((
             model,
-            equations * left_out_chi_sq.ln() + heavier_tails * penalty,
+            equations * libm::log(left_out_chi_sq) + heavier_tails * penalty,
         ))
     }
 }

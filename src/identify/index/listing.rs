@@ -68,7 +68,7 @@ impl ListedStar {
 
 /// Smallest and largest longest side of each class, in radians, for a catalog of `stars` stars.
 pub fn class_limits_rad(stars: usize) -> Vec<[f64; 2]> {
-    let octaves = (MAX_DEG / MIN_DEG).ln() / CLASS_FACTOR.ln();
+    let octaves = libm::log(MAX_DEG / MIN_DEG) / libm::log(CLASS_FACTOR);
     let count = octaves.ceil() as i32;
     let limits = |class: i32| {
         let low_rad = MIN_DEG * RAD_PER_DEG * CLASS_FACTOR.powi(class);

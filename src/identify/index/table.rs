@@ -169,8 +169,8 @@ impl SizeClass {
         Self {
             low,
             high,
-            ln_low: low.ln(),
-            ln_step: (high / low).ln() / SIZES,
+            ln_low: libm::log(low),
+            ln_step: libm::log(high / low) / SIZES,
             cell_starts,
             chunks: (0..CHUNKS).map(|_| OnceLock::new()).collect(),
         }

@@ -237,7 +237,7 @@ impl Blends {
             .sum();
         Some(Blend {
             pixel,
-            v_mag: f64::from(star.v_mag) - 2.5 * sum.log10(),
+            v_mag: f64::from(star.v_mag) - 2.5 * libm::log10(sum),
             others: others.min(MAX_RIVALS),
         })
     }
@@ -271,7 +271,10 @@ impl BlendView<'_> {
         let direction = self.problem.field.places.of(star);
         let in_camera = self.hypothesis.icrs_to_camera.apply(&direction);
         let pixel = self.hypothesis.camera.pixel_of(&in_camera)?;
-        Some((pixel, 10f64.powf(0.4 * f64::from(unit_v_mag - star.v_mag))))
+        Some((
+            pixel,
+            libm::pow(10f64, 0.4 * f64::from(unit_v_mag - star.v_mag)),
+        ))
     }
 
     fn direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
@@ -289,7 +292,7 @@ fn is_absorbed(seen: &[Seen], index: usize, variance_px2: f64) -> bool {
     let is_at = |place: &PixelPoint| place.distance_to(&light) < same_px;
     let is_there = |other: &Seen| is_at(&other.own) || other.blend.is_some_and(|b| is_at(&b.pixel));
     let gives_more = |other: &Seen| {
-        let flux = 10f64.powf(0.4 * f64::from(star.own_v_mag - other.own_v_mag));
+        let flux = libm::pow(10f64, 0.4 * f64::from(star.own_v_mag - other.own_v_mag));
         let ratio = flux * weight_ratio(&light, [&other.own, &star.own], variance_px2);
         if (1.0 / AS_MUCH..AS_MUCH).contains(&ratio) {
             other.star < star.star
@@ -305,12 +308,12 @@ fn is_absorbed(seen: &[Seen], index: usize, variance_px2: f64) -> bool {
 /// one at the second.
 fn weight_ratio(at: &PixelPoint, [first, second]: [&PixelPoint; 2], variance_px2: f64) -> f64 {
     let nearer_px2 = at.distance_to(second).powi(2) - at.distance_to(first).powi(2);
-    (nearer_px2 / (4.0 * variance_px2)).exp()
+    libm::exp(nearer_px2 / (4.0 * variance_px2))
 }
 
 /// What a spot at `at` takes up of the light of a star at `place`.
 fn weight_at(at: &PixelPoint, place: &PixelPoint, variance_px2: f64) -> f64 {
-    (-at.distance_to(place).powi(2) / (4.0 * variance_px2)).exp()
+    libm::exp(-at.distance_to(place).powi(2) / (4.0 * variance_px2))
 }
 
 /// The mode of `Σ F exp(−d² / 4s²)` uphill from `start`.

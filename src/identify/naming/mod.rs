@@ -243,7 +243,7 @@ impl Gate {
         Self {
             excess_sigma_px,
             rare_px: (GATE_CHANCE * area_px2 / PI).sqrt(),
-            diagonal_px: field.width_px.hypot(field.height_px),
+            diagonal_px: libm::hypot(field.width_px, field.height_px),
         }
     }
 

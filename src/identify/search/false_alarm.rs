@@ -151,11 +151,11 @@ impl FalseAlarm {
             }
         }
         let best = self.least_likely();
-        (best + (search_weight(hypotheses) * tests as f64).log10()).min(0.0)
+        (best + libm::log10(search_weight(hypotheses) * tests as f64)).min(0.0)
     }
 
     fn set_radii(&mut self, field: &StarField) {
-        let largest_px = MAX_RADIUS_SHARE * field.width_px.hypot(field.height_px);
+        let largest_px = MAX_RADIUS_SHARE * libm::hypot(field.width_px, field.height_px);
         // At least one radius, also in the smallest frame.
         let largest_px = largest_px.max(MIN_RADIUS_PX);
         let radii =
@@ -374,7 +374,7 @@ fn ln_binomial(all: usize, some: usize) -> f64 {
 /// The inverses of the weights add up to at most one over the longest search, so the probability
 /// that any hypothesis of a search passes by chance is bounded.
 fn search_weight(hypotheses: u64) -> f64 {
-    hypotheses.max(1) as f64 * (1.0 + (MAX_HYPOTHESES as f64).ln())
+    hypotheses.max(1) as f64 * (1.0 + libm::log(MAX_HYPOTHESES as f64))
 }
 
 #[cfg(test)]

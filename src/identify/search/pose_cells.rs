@@ -136,13 +136,13 @@ impl PoseGrids {
             [v.x, v.y, v.z].map(|x| x as f32)
         });
         for (grid, shift) in SHIFTS.into_iter().enumerate() {
-            let [first, last] = focal_px.map(|focal_px| level(focal_px.ln() as f32, shift));
+            let [first, last] = focal_px.map(|focal_px| level(libm::log(focal_px) as f32, shift));
             self.first_level[grid] = first - 1;
             let levels = &mut self.levels[grid];
             levels.clear();
             levels.extend((first - 1..=last + 1).map(|level| {
                 let middle = (level as f32 + 0.5 - shift) * SCALE_STEP + LEVELS_FROM;
-                let step_rad = AXIS_STEP * (width_px / f64::from(middle).exp()).atan();
+                let step_rad = AXIS_STEP * libm::atan(width_px / libm::exp(f64::from(middle)));
                 let max_chord = near.map_or(f64::INFINITY, |near| {
                     chord_of(near.radius_rad + NEAR_SLACK * step_rad)
                 });

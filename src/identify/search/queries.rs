@@ -119,7 +119,7 @@ impl ObservedStars<'_> {
     /// The triangle of these stars; `None` if it is too small, too large or too inexact.
     pub fn triangle(&self, stars: [usize; 3], pass: &SearchPass) -> Option<ObservedTriangle> {
         let offsets @ [a, b, c] = stars.map(|star| self.offset(star));
-        let side = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+        let side = |p: [f64; 2], q: [f64; 2]| libm::hypot(p[0] - q[0], p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
         let shares = MIN_TRIANGLE_SHARE..=pass.largest_share;
         if !shares.contains(&(longest_px / self.diagonal_px)) {
@@ -130,7 +130,7 @@ impl ObservedStars<'_> {
             .map(|&s| self.field.stars[s].sigma_px)
             .fold(0.0, f64::max);
         let centroid_tolerance = CENTROID_SIGMAS * sigma_px / longest_px;
-        let tolerance = pass.tolerance.hypot(centroid_tolerance);
+        let tolerance = libm::hypot(pass.tolerance, centroid_tolerance);
         if tolerance > MAX_TOLERANCE {
             return None;
         }
@@ -142,7 +142,7 @@ impl ObservedStars<'_> {
             longest_px,
             tolerance,
             true_confirmation: pass.true_confirmation,
-            confirming_px: distortion_px.hypot(CONFIRMING_SIGMAS * leverage * sigma_px),
+            confirming_px: libm::hypot(distortion_px, CONFIRMING_SIGMAS * leverage * sigma_px),
         })
     }
 
@@ -182,18 +182,18 @@ impl ObservedStars<'_> {
     ) {
         /// Steps are smaller by this factor: the shape changes a little unevenly.
         const UNEVENNESS: f64 = 1.25;
-        let (ln_low, ln_range) = (low_px.ln(), (high_px / low_px).ln());
+        let (ln_low, ln_range) = (libm::log(low_px), libm::log(high_px / low_px));
         let [low, middle, high] = [low_px, (low_px * high_px).sqrt(), high_px]
             .map(|focal_px| self.ratios(triangle, focal_px));
-        let change = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let change = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]);
         let most = change(low, middle).max(change(middle, high));
         let steps = (2.0 * most * UNEVENNESS / triangle.tolerance).ceil();
         let steps = steps.clamp(1.0, MAX_STEPS);
-        let slack = (1.0 + 2.0 * triangle.tolerance).ln();
+        let slack = libm::log(1.0 + 2.0 * triangle.tolerance);
         for number in 0..steps as u32 {
             let [from, middle, to] =
                 [0.0, 0.5, 1.0].map(|at| ln_low + ln_range * (f64::from(number) + at) / steps);
-            let middle_px = middle.exp();
+            let middle_px = libm::exp(middle);
             let [a, b, c] = &self.vectors(triangle, middle_px);
             if let Some(shape) = TriangleShape::new([a, b, c]) {
                 queries.push(Query {
@@ -207,7 +207,7 @@ impl ObservedStars<'_> {
                         ratios: shape.ratios,
                         tolerance: triangle.tolerance,
                     },
-                    ln_size: middle + shape.longest.ln(),
+                    ln_size: middle + libm::log(shape.longest),
                     middle_px,
                     ln_focal: [from - slack, to + slack],
                 });

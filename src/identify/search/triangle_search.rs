@@ -129,7 +129,7 @@ impl<'a> Search<'a> {
                 field,
                 sky,
                 focal_px,
-                diagonal_px: field.width_px.hypot(field.height_px),
+                diagonal_px: libm::hypot(field.width_px, field.height_px),
             },
             number: 1,
             hypotheses: 0,
@@ -241,7 +241,7 @@ impl<'a> Search<'a> {
         let mut counts = counts.filter(|(number, _)| *number == 0 || STARS[number - 1] < all);
         counts.find_map(|(number, stars)| {
             let found = self.adopt_with(hypothesis, stars)?;
-            let log10_false_alarm = found.log10_false_alarm + (number as f64 + 1.0).log10();
+            let log10_false_alarm = found.log10_false_alarm + libm::log10(number as f64 + 1.0);
             (log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
                 log10_false_alarm,
                 ..found
@@ -455,10 +455,10 @@ impl<'a> Search<'a> {
             .map(|c| self.problem.sky.grid.star(c))
             .map(GridStar::vector);
         let longest = (sky[0] - sky[1]).norm();
-        let focal_px = (query.ln_size - longest.ln()).exp();
+        let focal_px = libm::exp(query.ln_size - libm::log(longest));
         if let Some(SkyRegion { centre, radius_rad }) = &self.near {
-            let reach_rad = (self.observed.diagonal_px / focal_px).atan() + radius_rad;
-            if centre.as_vector().dot(&sky[0]) < reach_rad.min(std::f64::consts::PI).cos() {
+            let reach_rad = libm::atan(self.observed.diagonal_px / focal_px) + radius_rad;
+            if centre.as_vector().dot(&sky[0]) < libm::cos(reach_rad.min(std::f64::consts::PI)) {
                 return None;
             }
         }
@@ -616,7 +616,7 @@ impl<'a> Search<'a> {
                 ..self.problem
             };
             let log10 = self.log10_in(problem, hypothesis, TESTED_STARS)?;
-            Some(log10 + searches_weight(number).log10())
+            Some(log10 + libm::log10(searches_weight(number)))
         });
         let best_log10 = of_tiers.fold(log10, f64::min);
         self.buffers.tiers = tiers;
@@ -652,7 +652,7 @@ impl<'a> Search<'a> {
             ..
         } = self.buffers;
         let log10 = false_alarm.log10(hypothesis, hypotheses, problem, stars, &mut refiner.around);
-        Some((log10 + searches_weight(self.number).log10()).min(0.0))
+        Some((log10 + libm::log10(searches_weight(self.number))).min(0.0))
     }
 }
 

@@ -84,7 +84,7 @@ fn log10_at_most(seen: usize, expected: usize) -> f64 {
         term *= (expected - k) as f64 / (k + 1) as f64 * P_SEEN / (1.0 - P_SEEN);
         sum += term;
     }
-    sum.min(1.0).log10()
+    libm::log10(sum.min(1.0))
 }
 
 #[cfg(test)]

@@ -35,8 +35,8 @@ impl CurvePoint {
         let found = point.found as f64;
         Self {
             spot_px,
-            log_spot: spot_px.ln(),
-            log_rms: point.rms_px.ln() + 0.25 / found,
+            log_spot: libm::log(spot_px),
+            log_rms: libm::log(point.rms_px) + 0.25 / found,
             weight: found,
         }
     }
@@ -75,12 +75,12 @@ impl ErrorCurve {
     pub fn at(&self, spot_px: f64) -> f64 {
         /// With fewer points in total no parabola is fitted, as it would pass through all of them.
         const MIN_FOR_PARABOLA: usize = 4;
-        let at = spot_px.ln();
+        let at = libm::log(spot_px);
         let log_rms = match self.points.len() {
             0..MIN_FOR_PARABOLA => self.joined_at(at),
             _ => self.fitted_at(at),
         };
-        log_rms.exp()
+        libm::exp(log_rms)
     }
 
     /// Linear interpolation between the adjacent points, in logarithms.
@@ -131,7 +131,7 @@ impl ErrorCurve {
         (0..=STEPS).map(move |i| match i {
             0 => first,
             STEPS => last,
-            _ => first * (last / first).powf(i as f64 / STEPS as f64),
+            _ => first * libm::pow(last / first, i as f64 / STEPS as f64),
         })
     }
 

@@ -166,7 +166,7 @@ impl PeakStudy {
                 let y = y as f64 - half;
                 for (x, column) in columns.iter().enumerate() {
                     let x = x as f64 - half;
-                    if (x - at_x).hypot(y - at_y) <= support_px {
+                    if libm::hypot(x - at_x, y - at_y) <= support_px {
                         sum += row * column;
                         sum_x += x * row * column;
                         sum_y += y * row * column;

@@ -199,7 +199,7 @@ impl SmearedSpot {
 
     /// Width of the most similar round spot: the geometric mean of both widths.
     fn round_sigma_px(&self) -> f64 {
-        let along = self.sigma_px.hypot(self.smear_px / 12f64.sqrt());
+        let along = libm::hypot(self.sigma_px, self.smear_px / 12f64.sqrt());
         (along * self.sigma_px).sqrt()
     }
 
@@ -224,7 +224,7 @@ impl SmearedSpot {
             return 0.5 * (1.0 + libm::erf(t(at_px)));
         }
         // The integral of erf is t erf t + exp(−t²)/√π.
-        let integral = |t: f64| t * libm::erf(t) + (-t * t).exp() / std::f64::consts::PI.sqrt();
+        let integral = |t: f64| t * libm::erf(t) + libm::exp(-t * t) / std::f64::consts::PI.sqrt();
         let (high, low) = (at_px + smear_px / 2.0, at_px - smear_px / 2.0);
         let scale = SQRT_2 * self.sigma_px / smear_px;
         0.5 + 0.5 * scale * (integral(t(high)) - integral(t(low)))

@@ -39,7 +39,7 @@ impl Faintest {
         detector: &Detector,
     ) -> Option<Self> {
         let found = |v_mag| (v_mag, detector.probability(v_mag), part);
-        let any = |chance: f64, mean: f64| -(-chance * mean).exp_m1();
+        let any = |chance: f64, mean: f64| -libm::expm1(-chance * mean);
         Self::from_chances(v_mags.into_iter().map(found).collect(), any)
     }
 

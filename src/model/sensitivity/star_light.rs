@@ -55,7 +55,7 @@ impl StarLight {
     /// Magnitude offset in V at which a star of this B−V leaves as many electrons as one of the
     /// scenario's temperature; positive if fainter.
     pub fn color_effect_mag(&self, bv_mag: f64) -> f64 {
-        2.5 * self.relative(bv_mag).log10()
+        2.5 * libm::log10(self.relative(bv_mag))
     }
 
     /// V magnitude at which a star of the scenario's temperature leaves this number of electrons.

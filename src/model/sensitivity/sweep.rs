@@ -28,7 +28,7 @@ impl Spacing {
                 _ if i == last => to,
                 Self::Linear => rounded_as(from + part * (to - from), from.abs().max(to.abs())),
                 Self::Log => {
-                    let value = from * (to / from).powf(part);
+                    let value = from * libm::pow(to / from, part);
                     rounded_as(value, value)
                 }
             }
@@ -60,7 +60,7 @@ impl Spacing {
 
 /// `value`, rounded to the twelfth digit of `size`.
 fn rounded_as(value: f64, size: f64) -> f64 {
-    let decimals = (11.0 - size.log10().floor()).max(0.0) as usize;
+    let decimals = (11.0 - libm::log10(size).floor()).max(0.0) as usize;
     // Via decimal digits, as a product with a power of ten is not exact.
     format!("{value:.decimals$}").parse().unwrap_or(value)
 }

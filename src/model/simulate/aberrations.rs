@@ -38,7 +38,7 @@ impl Aberrations {
         let major_sigma_px = sheet.spot_sigma_px * stretch;
         Self {
             centre: PixelPoint::new((width - 1.0) / 2.0, (height - 1.0) / 2.0),
-            radius_px: width.hypot(height) / 2.0,
+            radius_px: libm::hypot(width, height) / 2.0,
             coma_px: made.coma_px,
             astigmatism_px: made.astigmatism_px,
             field_curvature_px: made.field_curvature_px,
@@ -59,7 +59,7 @@ impl Aberrations {
     /// Largest displacement, in pixels.
     pub fn reach_px(&self) -> f64 {
         let along = self.elongation.iter().map(|ray| ray.offset_px);
-        let elongation_px = along.map(|[x, y]| x.hypot(y)).fold(0.0, f64::max);
+        let elongation_px = along.map(|[x, y]| libm::hypot(x, y)).fold(0.0, f64::max);
         let defocus_px = self.field_curvature_px.abs() + self.astigmatism_px.abs();
         elongation_px + self.coma_px.abs() + defocus_px
     }
@@ -68,7 +68,7 @@ impl Aberrations {
     pub fn trace(&self, position: &PixelPoint, rays: &mut Vec<Ray>) {
         let field = [position.x - self.centre.x, position.y - self.centre.y];
         let field = field.map(|offset_px| offset_px / self.radius_px);
-        let distance = field[0].hypot(field[1]);
+        let distance = libm::hypot(field[0], field[1]);
         let coma_px = self.coma_px * distance;
         let defocus_px = self.field_curvature_px * distance * distance;
         let astigmatism_px = self.astigmatism_px * distance * distance;

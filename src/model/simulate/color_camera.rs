@@ -100,7 +100,7 @@ pub fn demosaiced(mosaic: &[f64], width: usize, height: usize) -> Vec<[f64; 3]> 
 /// Smooths `colors` with a Gaussian, along the rows and then along the columns.
 fn smooth(colors: &mut [[f64; 3]], width: usize, sigma_px: f64) {
     let reach = (3.0 * sigma_px).ceil() as usize;
-    let weight = |distance: usize| (-0.5 * (distance as f64 / sigma_px).powi(2)).exp();
+    let weight = |distance: usize| libm::exp(-0.5 * (distance as f64 / sigma_px).powi(2));
     let weights: Vec<f64> = (0..=reach).map(weight).collect();
     for (stride, length) in [(1, width), (width, colors.len() / width)] {
         let before = colors.to_vec();

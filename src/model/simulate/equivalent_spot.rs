@@ -38,13 +38,13 @@ pub(super) fn make_gaussian(sheet: &mut DataSheet) {
     for &(x, y) in &centres {
         renderer.add(&mut image, &PixelPoint::new(x as f64, y as f64), 1.0);
     }
-    let steps = ((SIGMAS_PX[1] / SIGMAS_PX[0]).ln() / SIGMA_RATIO.ln()) as i32;
+    let steps = (libm::log(SIGMAS_PX[1] / SIGMAS_PX[0]) / libm::log(SIGMA_RATIO)) as i32;
     let sigmas = || (0..steps).map(|step| SIGMAS_PX[0] * SIGMA_RATIO.powi(step));
     let mean_ln_response = |sigma_px: f64| {
         let profile = profile(sigma_px);
         let ln_responses = centres
             .iter()
-            .map(|&(x, y)| response(&image, x, y, &profile).ln());
+            .map(|&(x, y)| libm::log(response(&image, x, y, &profile)));
         ln_responses.sum::<f64>() / centres.len() as f64
     };
     let best = sigmas()
@@ -53,7 +53,7 @@ pub(super) fn make_gaussian(sheet: &mut DataSheet) {
     // The response of a Gaussian to its own filter falls with its width.
     let gain = |sigma_px: &f64| profile(*sigma_px).iter().map(|p| p * p).sum::<f64>();
     sheet.spot_sigma_px = sigmas()
-        .find(|sigma| gain(sigma).ln() < best)
+        .find(|sigma| libm::log(gain(sigma)) < best)
         .unwrap_or(SIGMAS_PX[1]);
     sheet.imperfections.spot_form = SpotForm::Gaussian;
 }

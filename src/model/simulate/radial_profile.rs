@@ -62,7 +62,7 @@ impl RadialProfile {
         ];
         /// The same of two points.
         const COARSE: [(f64, f64); 1] = [(0.288_675_134_594_812_9, 0.5)];
-        let rule: &[(f64, f64)] = if x_px.hypot(y_px) < self.core_px {
+        let rule: &[(f64, f64)] = if libm::hypot(x_px, y_px) < self.core_px {
             &FINE
         } else {
             &COARSE
@@ -72,8 +72,9 @@ impl RadialProfile {
                 .flat_map(|&(at, weight)| [(at, weight), (-at, weight)])
         };
         let row = |(y, of_y): (f64, f64)| {
-            let point =
-                move |(x, of_x): (f64, f64)| of_x * of_y * self.density((x_px + x).hypot(y_px + y));
+            let point = move |(x, of_x): (f64, f64)| {
+                of_x * of_y * self.density(libm::hypot(x_px + x, y_px + y))
+            };
             points().map(point).sum::<f64>()
         };
         points().map(row).sum()

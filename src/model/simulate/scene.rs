@@ -136,11 +136,8 @@ impl Scene {
         const COSINE: f64 = std::f64::consts::FRAC_2_PI;
         let swing_deg_s = COSINE * std::f64::consts::TAU * self.swing_deg / self.swing_period_s;
         let tumble_deg_s = SINE * self.tumble_deg_s;
-        let steady_deg_s = self.rate_x_deg_s.hypot(self.rate_y_deg_s);
-        steady_deg_s
-            .hypot(swing_deg_s)
-            .hypot(tumble_deg_s)
-            .to_radians()
+        let steady_deg_s = libm::hypot(self.rate_x_deg_s, self.rate_y_deg_s);
+        libm::hypot(libm::hypot(steady_deg_s, swing_deg_s), tumble_deg_s).to_radians()
     }
 
     /// Largest angular rate in any frame, in degrees per second.

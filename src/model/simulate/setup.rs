@@ -81,7 +81,7 @@ impl Setup {
         let terms_px = self.scenario.camera.imperfections.lens_terms_px();
         let [third, fifth, seventh, _, _, x, y, stretch, skew] = terms_px;
         let radial_px = third.abs() + fifth.abs() + seventh.abs();
-        let found_px = radial_px.max(2.0 * x.hypot(y) + stretch.hypot(skew));
+        let found_px = radial_px.max(2.0 * libm::hypot(x, y) + libm::hypot(stretch, skew));
         let most_px = MAX_STEEPNESS * camera.radius_px();
         let corners = camera.corners();
         let is_blind = camera.is_pinhole()

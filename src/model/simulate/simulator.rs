@@ -121,7 +121,7 @@ impl<'a> Simulator<'a> {
         let conditions = &mut uniform.conditions;
         let turn_rad = self.scene.typical_rate_rad_s() * conditions.exposure_s;
         let motion_px = turn_rad * self.camera.focal_length_px();
-        conditions.motion_px = conditions.motion_px.hypot(motion_px);
+        conditions.motion_px = libm::hypot(conditions.motion_px, motion_px);
         let none = Scene {
             sky_gradient: 0.0,
             cloud_mag: 0.0,
@@ -132,7 +132,7 @@ impl<'a> Simulator<'a> {
         let mut random = random(0, FrameStream::Scene);
         let mut image = self.image();
         Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut image, 1.0);
-        let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * mean(image.pixels()).log10();
+        let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * libm::log10(mean(image.pixels()));
         conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
         make_gaussian(&mut uniform.camera);
         uniform

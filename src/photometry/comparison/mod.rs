@@ -174,7 +174,7 @@ fn detector(
         false => Detector::matched_filter(&frame.detect, scenario, budget),
     };
     // The filter sees the spots alone.
-    let wings_mag = -2.5 * (1.0 + frame.wings).log10();
+    let wings_mag = -2.5 * libm::log10(1.0 + frame.wings);
     // Where less light arrives, the sky's noise is smaller, too.
     let noise_where = |transmission: f64| {
         let sky_variance_e2 = transmission * budget.background_e;
@@ -183,7 +183,7 @@ fn detector(
     let typical_noise_e = noise_where(typical);
     let difference_mag = |&part: &f64| {
         let signal_to_noise = part * typical_noise_e / noise_where(part);
-        wings_mag + 2.5 * signal_to_noise.max(1e-6).log10()
+        wings_mag + 2.5 * libm::log10(signal_to_noise.max(1e-6))
     };
     detector.over(&transmissions.iter().map(difference_mag).collect::<Vec<_>>())
 }
@@ -264,7 +264,7 @@ fn sky_mag_arcsec2(scenario: &Scenario, frame: &FrameMeasurement, typical: f64) 
         .map(|sky_e| sky_e / typical)
         .find(|sky_e| *sky_e > 0.0 && sky_e.is_finite())
         .map_or(NO_SKY_MAG, |sky_e| {
-            2.5 * (of_mag_0.background_e / sky_e).log10()
+            2.5 * libm::log10(of_mag_0.background_e / sky_e)
         })
 }
 

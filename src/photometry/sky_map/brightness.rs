@@ -231,7 +231,7 @@ impl Sum {
         Some(SkyLight {
             mag_arcsec2: Estimate {
                 value: mag,
-                sigma: zero_point.sigma.hypot(by_color_mag),
+                sigma: libm::hypot(zero_point.sigma, by_color_mag),
             },
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
         })

@@ -102,7 +102,7 @@ struct StarErrors {
 impl StarErrors {
     /// The error of a magnitude with this stated one.
     fn of(&self, sigma_mag: f64) -> f64 {
-        (self.scale * sigma_mag).hypot(self.scatter_mag)
+        libm::hypot(self.scale * sigma_mag, self.scatter_mag)
     }
 }
 

@@ -95,7 +95,7 @@ impl Sky<'_> {
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
             let likelihood = match (dimmed_by, star.is_detected) {
                 (Some(dimmed_by), _) => {
-                    let sigma_mag = dimmed_by.sigma.hypot(CLOUD_VARIATION * extinction_mag);
+                    let sigma_mag = libm::hypot(dimmed_by.sigma, CLOUD_VARIATION * extinction_mag);
                     let off = (dimmed_by.value - extinction_mag) / sigma_mag;
                     let agrees = libm::exp(-0.5 * off * off) / sigma_mag;
                     (1.0 - UNTRUE) * agrees + UNTRUE
@@ -103,7 +103,7 @@ impl Sky<'_> {
                 (None, true) => seen,
                 (None, false) => 1.0 - seen,
             };
-            likelihood.max(f64::MIN_POSITIVE).ln()
+            libm::log(likelihood.max(f64::MIN_POSITIVE))
         })
     }
 }

@@ -113,11 +113,11 @@ impl RobustWeights {
 fn variances_by_magnitude(stars: &[StandardStar]) -> Vec<f64> {
     let count = stars.len() as f64;
     let mean = |value: &dyn Fn(&StandardStar) -> f64| stars.iter().map(value).sum::<f64>() / count;
-    let ln_variance = |star: &StandardStar| 2.0 * star.sigma_mag.ln();
+    let ln_variance = |star: &StandardStar| 2.0 * libm::log(star.sigma_mag);
     let (mean_v_mag, mean_ln) = (mean(&|star| star.v_mag), mean(&ln_variance));
     let fainter = |star: &StandardStar| star.v_mag - mean_v_mag;
     let spread = mean(&|star| fainter(star).powi(2)).max(f64::MIN_POSITIVE);
     let slope = mean(&|star| fainter(star) * (ln_variance(star) - mean_ln)) / spread;
-    let variance = |star: &StandardStar| (mean_ln + slope * fainter(star)).exp();
+    let variance = |star: &StandardStar| libm::exp(mean_ln + slope * fainter(star));
     stars.iter().map(variance).collect()
 }

@@ -32,13 +32,13 @@ impl Mark {
     fn is_covered_by(&self, [left, top, right, bottom]: &Rectangle) -> bool {
         let dx = self.x - self.x.clamp(*left, *right);
         let dy = self.y - self.y.clamp(*top, *bottom);
-        dx.hypot(dy) < self.radius
+        libm::hypotf(dx, dy) < self.radius
     }
 
     /// Line from the ring to the nearest point of the rectangle.
     fn line_to(&self, [left, top, right, bottom]: &Rectangle) -> [[f32; 2]; 2] {
         let (x, y) = (self.x.clamp(*left, *right), self.y.clamp(*top, *bottom));
-        let share = self.radius / (x - self.x).hypot(y - self.y).max(self.radius);
+        let share = self.radius / libm::hypotf(x - self.x, y - self.y).max(self.radius);
         let from = [self.x + share * (x - self.x), self.y + share * (y - self.y)];
         [from, [x, y]]
     }

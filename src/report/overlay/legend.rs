@@ -228,14 +228,14 @@ pub(super) fn north_and_east(identification: &Identification) -> [[f32; 2]; 2] {
         } else {
             along.x
         };
-        let length = x.hypot(along.y);
+        let length = libm::hypot(x, along.y);
         [(x / length) as f32, (along.y / length) as f32]
     })
 }
 
 /// Length of an angle across the centre, in pixels of the frame.
 fn length_px(camera: &CameraModel, angle_rad: f64) -> f64 {
-    2.0 * camera.focal_length_px() * (angle_rad / 2.0).tan()
+    2.0 * camera.focal_length_px() * libm::tan(angle_rad / 2.0)
 }
 
 /// `text` cut to this width, in units.

@@ -177,7 +177,7 @@ impl Rings {
         const PER_MAG: f32 = 1.1;
         let above = source
             .flux
-            .map_or(0.0, |flux| 2.5 * (flux / self.flux).log10());
+            .map_or(0.0, |flux| 2.5 * libm::log10(flux / self.flux));
         // NaN gets the smallest ring.
         let above = if above > 0.0 { above as f32 } else { 0.0 };
         let most = (RADIUS.1 * self.unit).max(self.smallest);

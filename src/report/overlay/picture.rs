@@ -329,7 +329,7 @@ fn above_sky(squares: &Squares<'_>, noise: f32) -> Vec<u8> {
     let noise = noise.max(brightest * 1e-3).max(f32::MIN_POSITIVE * 1e6);
     let white = (bright.max(MIN_WHITE_SIGMA * noise)).min(brightest.max(noise));
     let black = -BLACK_SIGMA * noise;
-    let stretch = |above: f32| (above / (LINEAR_SIGMA * noise)).asinh();
+    let stretch = |above: f32| libm::asinhf(above / (LINEAR_SIGMA * noise));
     let most = stretch(white - black);
     // The table is even in the square root of the level, hence fine where the curve is steep.
     let table: Vec<u8> = (0..STEPS)

@@ -14,7 +14,7 @@ pub(super) fn draw(canvas: &mut Canvas, picture: &Picture, solution: &Solution) 
     for trail in solution.trails.iter().flatten() {
         let [begin, end] = [trail.begin, trail.end].map(|end| picture.position_of(&end));
         let along = [end[0] - begin[0], end[1] - begin[1]];
-        let length = along[0].hypot(along[1]).max(1.0);
+        let length = libm::hypotf(along[0], along[1]).max(1.0);
         let away = 2.0 * trail.width_sigma_px as f32 * picture.scale() + GAP * canvas.unit;
         let across = [-along[1], along[0]].map(|part| part / length * away);
         for side in [-1.0, 1.0] {

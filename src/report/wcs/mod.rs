@@ -195,7 +195,7 @@ fn add_errors(header: &mut FitsHeader, identification: &Identification) {
     let [sigma_x, sigma_y, _] = identification.attitude_sigma_rad();
     // A rotation about x moves the boresight along y, and one about y along x.
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
-        let sigma_rad = (axis[0] * sigma_y).hypot(axis[1] * sigma_x);
+        let sigma_rad = libm::hypot(axis[0] * sigma_y, axis[1] * sigma_x);
         let sigma_deg = sigma_rad * DEG_PER_RAD;
         header.real(keyword, sigma_deg, "standard error of the centre");
     }

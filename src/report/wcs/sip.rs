@@ -140,8 +140,8 @@ impl Sip {
 fn pixels(camera: &CameraModel) -> Vec<PixelPoint> {
     let node = |i: usize| {
         let angle = (i as f64 + 0.5) / FIT_POINTS as f64 * std::f64::consts::PI;
-        let outermost = (0.5 / FIT_POINTS as f64 * std::f64::consts::PI).cos();
-        0.5 * FIT_REACH * angle.cos() / outermost
+        let outermost = libm::cos(0.5 / FIT_POINTS as f64 * std::f64::consts::PI);
+        0.5 * FIT_REACH * libm::cos(angle) / outermost
     };
     let centre = camera.centre();
     let at = |i: usize, j: usize| {
@@ -164,7 +164,7 @@ fn fit_best(from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64) -> Option<[Polyno
         };
         let errors_px = from.iter().zip(to).map(|(from, to)| {
             let [x, y] = [0, 1].map(|axis: usize| fitted[axis].at(*from) - to[axis]);
-            x.hypot(y)
+            libm::hypot(x, y)
         });
         let error_px = errors_px.fold(0.0, f64::max);
         if best.as_ref().is_none_or(|(least, _)| error_px < *least) {

@@ -68,7 +68,7 @@ const CELL_SIZE: f64 = 2.0 / CELLS as f64;
 /// The chord of an angle, which is clamped to half a turn.
 #[inline]
 pub fn chord_of(angle_rad: f64) -> f64 {
-    2.0 * (angle_rad.clamp(0.0, PI) / 2.0).sin()
+    2.0 * libm::sin(angle_rad.clamp(0.0, PI) / 2.0)
 }
 
 fn cell_along(coordinate: f64) -> usize {

@@ -170,8 +170,8 @@ impl Site {
 
     /// The unit vectors towards north, east and the zenith, in axes fixed to the Earth.
     fn north_east_up(&self) -> [Vector3<f64>; 3] {
-        let (sin_lat, cos_lat) = (self.lat_deg * RAD_PER_DEG).sin_cos();
-        let (sin_lon, cos_lon) = (self.lon_deg * RAD_PER_DEG).sin_cos();
+        let (sin_lat, cos_lat) = libm::sincos(self.lat_deg * RAD_PER_DEG);
+        let (sin_lon, cos_lon) = libm::sincos(self.lon_deg * RAD_PER_DEG);
         [
             Vector3::new(-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
             Vector3::new(-sin_lon, cos_lon, 0.0),
@@ -243,7 +243,7 @@ impl Observation {
         let seen = direction.as_vector() + earth::velocity_c(years);
         let terrestrial = earth::icrs_to_terrestrial(years) * seen.normalize();
         let [north, east, up] = site.north_east_up().map(|axis| axis.dot(&terrestrial));
-        let altitude_rad = up.atan2(north.hypot(east));
+        let altitude_rad = libm::atan2(up, libm::hypot(north, east));
         let (sine, cosine) = (libm::cos(altitude_rad), libm::sin(altitude_rad));
         let apparent_rad = altitude_rad + site.air.refraction_per_sine(cosine) * sine;
         let zenith_distance_rad = (FRAC_PI_2 - apparent_rad).max(0.0);
@@ -254,7 +254,7 @@ impl Observation {
         Some(Self {
             site,
             zenith_distance_rad: FRAC_PI_2 - altitude_rad,
-            azimuth_rad: east.atan2(north).rem_euclid(TAU),
+            azimuth_rad: libm::atan2(east, north).rem_euclid(TAU),
             apparent,
         })
     }

@@ -42,7 +42,7 @@ impl Air {
     /// U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), eq. 33a, extrapolated upwards.
     pub fn at_height(height_m: f64) -> Self {
         let relative_k = 1.0 - 2.255_77e-5 * height_m;
-        let pressure_hpa = SEA_LEVEL_HPA * relative_k.max(0.0).powf(5.255_88);
+        let pressure_hpa = SEA_LEVEL_HPA * libm::pow(relative_k.max(0.0), 5.255_88);
         let temperature_c = SEA_LEVEL_K * relative_k.max(0.75) - KELVIN_AT_0_C;
         Self::new(pressure_hpa, temperature_c)
     }

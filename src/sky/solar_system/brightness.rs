@@ -30,7 +30,7 @@ pub(super) fn v_mag(
         // Equation 16: it became brighter from 1980 to 2000.
         BodyKind::Neptune => (-6.89 - 0.0054 * (year - 1980.0)).clamp(-7.0, -6.89),
     };
-    at_unit_distance + 5.0 * (from_sun_au.norm() * from_earth_au.norm()).log10()
+    at_unit_distance + 5.0 * libm::log10(from_sun_au.norm() * from_earth_au.norm())
 }
 
 /// c0 + c1 x + c2 x² + ...
@@ -78,11 +78,15 @@ fn saturn(phase_deg: f64, from_sun_au: &Vector3<f64>, from_earth_au: &Vector3<f6
     /// The pole in ICRS, in degrees (IAU 2015, Archinal et al. 2018).
     const POLE_DEG: [f64; 2] = [40.589, 83.537];
     let [ra, dec] = POLE_DEG.map(|deg| deg * RAD_PER_DEG);
-    let pole = Vector3::new(dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin());
-    let tilt = |direction: &Vector3<f64>| -pole.dot(&direction.normalize()).asin();
+    let pole = Vector3::new(
+        libm::cos(dec) * libm::cos(ra),
+        libm::cos(dec) * libm::sin(ra),
+        libm::sin(dec),
+    );
+    let tilt = |direction: &Vector3<f64>| -libm::asin(pole.dot(&direction.normalize()));
     let product = tilt(from_sun_au) * tilt(from_earth_au);
     // The rings' lit side may be turned away from the Earth.
-    let sin_tilt = product.max(0.0).sqrt().sin();
-    let opposition_surge = 0.378 * sin_tilt * (-2.25 * phase_deg).exp();
+    let sin_tilt = libm::sin(product.max(0.0).sqrt());
+    let opposition_surge = 0.378 * sin_tilt * libm::exp(-2.25 * phase_deg);
     -8.914 - 1.825 * sin_tilt + 0.026 * phase_deg - opposition_surge
 }

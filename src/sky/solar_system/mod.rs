@@ -134,7 +134,7 @@ impl Time {
             direction: UnitVector::from_vector(from_earth_au),
             uncertainty_rad: kind.theory_error_rad() + motion_rad + parallax_rad,
             v_mag: brightness::v_mag(kind, &from_sun_au, &from_earth_au, year),
-            radius_rad: (kind.radius_km() / KM_PER_AU / distance_au).asin(),
+            radius_rad: libm::asin(kind.radius_km() / KM_PER_AU / distance_au),
         }
     }
 }

@@ -10,7 +10,7 @@ const EARTH_RADIUS_KM: f64 = 6_378.137;
 
 /// The largest angle between the Moon seen from a site and from the Earth's centre.
 pub(super) fn parallax_rad(distance_au: f64) -> f64 {
-    (EARTH_RADIUS_KM / KM_PER_AU / distance_au).asin()
+    libm::asin(EARTH_RADIUS_KM / KM_PER_AU / distance_au)
 }
 
 /// From the site, or the Earth's centre, to where the Moon is seen: `days_tt` days of terrestrial

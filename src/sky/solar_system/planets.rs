@@ -42,7 +42,7 @@ fn planet_au(kind: BodyKind, days: f64) -> Vector3<f64> {
 
 /// From the ecliptic of J2000.0 to the ICRS.
 fn icrs(ecliptic: &RectangularCoordinates) -> Vector3<f64> {
-    let (sin, cos) = OBLIQUITY_RAD.sin_cos();
+    let (sin, cos) = libm::sincos(OBLIQUITY_RAD);
     Vector3::new(
         ecliptic.x,
         cos * ecliptic.y - sin * ecliptic.z,

@@ -91,7 +91,7 @@ impl<'a> ClutterSky<'a> {
         Self {
             light: LightMap::of(&maker.scenario, truth),
             limit_vmag: maker.limit_vmag,
-            half_trail_px: x.hypot(y) / 2.0,
+            half_trail_px: libm::hypot(x, y) / 2.0,
         }
     }
 

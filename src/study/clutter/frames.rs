@@ -113,7 +113,7 @@ impl<'a> FrameMaker<'a> {
         let sigma_px = self.scenario.camera.spot_sigma_px.max(0.3);
         let seen = canvas.share_seen(&star.position, sigma_px);
         if seen < 1.0 {
-            star.v_mag -= 2.5 * seen.log10();
+            star.v_mag -= 2.5 * libm::log10(seen);
         }
         star.catalog.is_some() && (seen >= 0.5 || star.v_mag <= self.limit_vmag + BEYOND_LIMIT_MAG)
     }

@@ -56,7 +56,7 @@ impl DarkNoise {
 /// Among the groups of several frames that with the exposure nearest to `exposure_s`, as a ratio.
 fn nearest_group(darks: &Darks, exposure_s: Option<f64>) -> Option<&ExposureGroup> {
     let log_ratio = |group: &ExposureGroup| match (group.exposure_s, exposure_s) {
-        (Some(found_s), Some(wanted_s)) => (found_s / wanted_s).ln().abs(),
+        (Some(found_s), Some(wanted_s)) => libm::log(found_s / wanted_s).abs(),
         _ => 0.0,
     };
     let measured = darks.groups.iter().filter(|group| group.frames > 1);
@@ -100,7 +100,7 @@ impl Noise {
     /// [`NoiseError::Zero`].
     pub fn of_camera(scenario: &Scenario) -> Result<Self, NoiseError> {
         let budget = Budget::new(scenario);
-        let e = budget.read_noise_e.hypot(budget.dark_e.sqrt());
+        let e = libm::hypot(budget.read_noise_e, budget.dark_e.sqrt());
         Self::of_electrons(e, scenario, "the camera")
     }
 
@@ -111,7 +111,7 @@ impl Noise {
     /// [`NoiseError::NoTemporalNoise`], [`NoiseError::Zero`].
     pub fn of_good_pixels(darks: DarkNoise, scenario: &Scenario) -> Result<Self, NoiseError> {
         let temporal_adu = darks.temporal_adu.ok_or(NoiseError::NoTemporalNoise)?;
-        let noise_adu = temporal_adu.hypot(darks.pattern_adu.unwrap_or(0.0));
+        let noise_adu = libm::hypot(temporal_adu, darks.pattern_adu.unwrap_or(0.0));
         let source =
             "the dark frames: from frame to frame and from pixel to pixel, hot pixels left out";
         Ok(Self {

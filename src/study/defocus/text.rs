@@ -154,7 +154,7 @@ impl DefocusReport {
     fn noises_shown(&self) -> [f64; 4] {
         let [from, to] = self.noises;
         [0.0, 1.0, 2.0, 3.0].map(|third| match self.noise_unit {
-            "e" => from * (to / from).powf(third / 3.0),
+            "e" => from * libm::pow(to / from, third / 3.0),
             _ => from + (to - from) * third / 3.0,
         })
     }
@@ -289,7 +289,7 @@ fn or_dash(value: Option<f64>, decimals: usize) -> String {
 fn radii_text(line: &IsoLine, noise: f64) -> String {
     /// Largest distance of a noise, as a natural logarithm.
     const NEAR: f64 = 0.15;
-    let distance = |at: f64| (at / noise).ln().abs();
+    let distance = |at: f64| libm::log(at / noise).abs();
     let nearest = line
         .points
         .iter()

@@ -78,7 +78,7 @@ impl Centroid {
         const FLUX_OF_V_0: f64 = 1e8;
         let flux = match photometry {
             Photometry::JohnsonV => None,
-            Photometry::Instrumental => Some(FLUX_OF_V_0 * 10f64.powf(-0.4 * self.v_mag)),
+            Photometry::Instrumental => Some(FLUX_OF_V_0 * libm::pow(10f64, -0.4 * self.v_mag)),
         };
         ListedCentroid {
             flux,

@@ -18,7 +18,7 @@ impl Interval {
     /// The interval after `hits` in `trials` (Clopper & Pearson 1934, Biometrika 26, 404); [0, 1]
     /// without trials.
     pub fn of(hits: usize, trials: usize) -> Self {
-        let log10_tail = ((1.0 - CONFIDENCE) / 2.0).log10();
+        let log10_tail = libm::log10((1.0 - CONFIDENCE) / 2.0);
         // The probability at which `count` or more become likely enough.
         let low = |count: usize| {
             if count == 0 {

@@ -333,7 +333,7 @@ impl<'a> Evaluation<'a> {
         let scenario = &self.validator.protocol.setup.scenario;
         let colors = &measured.colors;
         let of_a_second = expected_zero_point_vmag(scenario, colors, measured.color_term.is_some());
-        let expected = of_a_second + 2.5 * scenario.conditions.exposure_s.log10();
+        let expected = of_a_second + 2.5 * libm::log10(scenario.conditions.exposure_s);
         Some((measured.v_mag - expected, measured.sigma_mag))
     }
 

@@ -49,8 +49,8 @@ pub(super) fn horizontal(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'
     ) else {
         return;
     };
-    let azimuth_rad = centre.dot(&east).atan2(centre.dot(&north));
-    let altitude_rad = centre.dot(zenith).clamp(-1.0, 1.0).asin();
+    let azimuth_rad = libm::atan2(centre.dot(&east), centre.dot(&north));
+    let altitude_rad = libm::asin(centre.dot(zenith).clamp(-1.0, 1.0));
     let place = |azimuth_deg: f64, altitude_deg: f64| {
         let [azimuth_rad, altitude_rad] = [azimuth_deg, altitude_deg].map(|deg| deg * RAD_PER_DEG);
         view.apparent(&places.in_horizon(azimuth_rad, altitude_rad)?)
@@ -111,14 +111,14 @@ impl Grid<'_> {
             (latitude + reach_deg).min(90.0 - POLE_DEG),
         );
         // Meridians are closest on the side of the nearer pole.
-        let narrowest = (south.abs().max(north.abs()) * RAD_PER_DEG).cos();
+        let narrowest = libm::cos(south.abs().max(north.abs()) * RAD_PER_DEG);
         let wide = latitude.abs() + reach_deg > 85.0;
         let reach_longitude = if wide {
             180.0
         } else {
             (reach_deg / narrowest).min(180.0)
         };
-        let middle = (latitude * RAD_PER_DEG).cos().max(0.1);
+        let middle = libm::cos(latitude * RAD_PER_DEG).max(0.1);
         let [step_longitude, step_latitude] = [
             step(self.steps_deg[0], reach_deg / middle),
             step(self.steps_deg[1], reach_deg),

@@ -125,7 +125,7 @@ impl Sky2000Record<'_> {
             return Ok(None);
         };
         // 0.00001 s of time is 0.15 mas along the equator; 0.0001″ is 0.1 mas.
-        let ra_mas_per_yr = f64::from(ra) * 15.0 / 100.0 * dec_rad.cos();
+        let ra_mas_per_yr = f64::from(ra) * 15.0 / 100.0 * libm::cos(dec_rad);
         let dec_mas_per_yr = f64::from(dec) / 10.0;
         for (column, mas_per_yr) in [
             (StarColumn::PmRa, ra_mas_per_yr),

@@ -194,7 +194,7 @@ impl TableRow<'_> {
             self.in_range(cell, limit, "a proper motion within 32.767\" a year")
         };
         let ra_mas = if motion.ra_needs_cos_dec {
-            motion.ra_unit_mas * dec_rad.cos()
+            motion.ra_unit_mas * libm::cos(dec_rad)
         } else {
             motion.ra_unit_mas
         };

@@ -78,7 +78,7 @@ impl Centroids {
         else {
             return;
         };
-        let bin = ((snr / FIRST_SNR).log2() * BINS_PER_OCTAVE).floor();
+        let bin = (libm::log2(snr / FIRST_SNR) * BINS_PER_OCTAVE).floor();
         if !(0.0..BINS as f64).contains(&bin) {
             return;
         }
@@ -118,7 +118,7 @@ impl CentroidSums {
     fn bin(&self, bin: usize) -> CentroidBin {
         let stars = self.stars as f64;
         let edge = |bin: usize| {
-            let snr = FIRST_SNR * (bin as f64 / BINS_PER_OCTAVE).exp2();
+            let snr = FIRST_SNR * libm::exp2(bin as f64 / BINS_PER_OCTAVE);
             to_significant(snr, 4)
         };
         let on_axis = |sum: f64| (sum / (2.0 * stars)).sqrt();

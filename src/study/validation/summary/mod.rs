@@ -288,7 +288,7 @@ impl Accumulator {
         let [Some(x), Some(y), Some(roll)] = errors else {
             return;
         };
-        self.boresight_arcsec.push(x.hypot(y));
+        self.boresight_arcsec.push(libm::hypot(x, y));
         self.roll_arcsec.push(roll.abs());
         for (sum, error) in self.squares_arcsec2.iter_mut().zip([x, y, roll]) {
             *sum += error * error;
