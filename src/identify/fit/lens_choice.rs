@@ -9,6 +9,7 @@ use crate::identify::field::StarField;
 use crate::identify::grid::FrameGrid;
 use crate::identify::hypothesis::Hypothesis;
 use arrayvec::ArrayVec;
+use nalgebra::{Matrix4, Vector4};
 
 /// Equations per parameter that a distortion model needs.
 const EQUATIONS_PER_PARAMETER: f64 = 4.0;
@@ -55,8 +56,9 @@ impl Lens {
 pub struct ChosenLens {
     /// The lens.
     pub lens: Lens,
-    /// Variance of ln f, about that of the lens, among projections that explain the stars nearly as well.
-    pub ln_f_variance: f64,
+    /// Covariance of the pose about that of the lens, as in [`CameraFit`](super::CameraFit), among projections that
+    /// explain the stars nearly as well.
+    pub covariance: Matrix4<f64>,
 }
 
 impl From<Lens> for ChosenLens {
@@ -64,7 +66,7 @@ impl From<Lens> for ChosenLens {
     fn from(lens: Lens) -> Self {
         Self {
             lens,
-            ln_f_variance: 0.0,
+            covariance: Matrix4::zeros(),
         }
     }
 }
@@ -74,7 +76,7 @@ struct Rival {
     lens: Lens,
     /// −2 ln of its likelihood, with penalties.
     misfit: f64,
-    focal_length_px: f64,
+    fitted: Hypothesis,
 }
 
 /// A camera with another projection, which sees the same near the axis of its lens, and its attitude.
@@ -109,17 +111,28 @@ pub struct LensChoice<'a> {
 }
 
 impl Rival {
-    /// Variance of ln f about this one's among all, which count as likely as they are.
+    /// Covariance of the pose about this one's among all, which count as likely as they are.
     ///
     /// # Reference
     /// Hoeting et al. 1999, Statist. Sci. 14, 382, eq. 2, for the variance between models.
-    fn ln_f_variance(&self, all: &[Self]) -> f64 {
+    fn covariance(&self, all: &[Self]) -> Matrix4<f64> {
         let weight = |rival: &Self| libm::exp(0.5 * (self.misfit - rival.misfit));
-        let squared =
-            |rival: &Self| libm::log(rival.focal_length_px / self.focal_length_px).powi(2);
-        let weights: f64 = all.iter().map(weight).sum();
-        let squares: f64 = all.iter().map(|rival| weight(rival) * squared(rival)).sum();
-        squares / weights
+        let (mut weights, mut sum) = (0.0, Matrix4::zeros());
+        for rival in all {
+            let change = self.change_to(rival);
+            weights += weight(rival);
+            sum += change * change.transpose() * weight(rival);
+        }
+        sum / weights
+    }
+
+    /// The small turn from this pose to another, and the change of ln f.
+    fn change_to(&self, other: &Self) -> Vector4<f64> {
+        let (camera, icrs_to_camera) = with_projection(&other.fitted, self.lens.projection);
+        let turn = icrs_to_camera.matrix() * self.fitted.icrs_to_camera.matrix().transpose();
+        let half = (turn - turn.transpose()) * 0.5;
+        let scale = camera.central_focal_length_px() / self.fitted.camera.central_focal_length_px();
+        Vector4::new(half[(2, 1)], half[(0, 2)], half[(1, 0)], libm::log(scale))
     }
 }
 
@@ -188,13 +201,13 @@ impl LensChoice<'_> {
             rivals.push(Rival {
                 lens: Lens { projection, model },
                 misfit: misfit + worth_a_projection(projection),
-                focal_length_px: fitted.camera.central_focal_length_px(),
+                fitted,
             });
         }
         let best = rivals.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit));
         best.map_or(Lens::of(&hypothesis.camera).into(), |best| ChosenLens {
             lens: best.lens,
-            ln_f_variance: best.ln_f_variance(&rivals),
+            covariance: best.covariance(&rivals),
         })
     }
 

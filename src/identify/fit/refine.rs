@@ -16,6 +16,7 @@ use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::naming::{Blends, Candidate, Naming, Stars};
 use crate::identify::pairing::{Pair, Pairing};
 use crate::identify::predict::{PredictedStar, Surroundings};
+use nalgebra::Matrix4;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -231,7 +232,7 @@ impl Refiner {
         let mut lens = Lens::of(&hypothesis.camera);
         lens.model = lens.model.max(wanted.min_distortion);
         let mut current = *settled;
-        let mut ln_f_variance = 0.0;
+        let mut among_lenses = Matrix4::zeros();
         for round in 0..MAX_NAMING_ROUNDS {
             let hypothesis = current.hypothesis();
             if round > 0 {
@@ -253,7 +254,7 @@ impl Refiner {
                 || self.depend_on_place(problem);
             if is_open {
                 let choice = self.choose_lens(problem, &current, DistortionModel::Irregular5);
-                ln_f_variance = choice.ln_f_variance;
+                among_lenses = choice.covariance;
                 let mut chosen = choice.lens;
                 chosen.model = chosen.model.max(wanted.min_distortion);
                 guess.lens = chosen;
@@ -268,7 +269,7 @@ impl Refiner {
                 break;
             }
         }
-        current.fit.covariance[(3, 3)] += ln_f_variance;
+        current.fit.covariance += among_lenses;
         Some(current)
     }
 
