@@ -40,6 +40,10 @@ const HAS_IMAGES = /\.(tiff?|fits?|fts|fz|gz)$/i;
 /** @type {Picture | null} */ let chosen = null;
 /** @type {Picture | null} */ let running = null;
 let isReady = false;
+/** Whether it ever was: the index is kept since, and soon there. */
+let wasReady = false;
+/** Ends the wait for the catalog, of which the preparation goes on. */
+let giveUp = () => {};
 const engine = new Engine((stage, share) => tellStage(stage, share));
 /** Shows and searches pictures among the bright stars, while the catalog is on its way. */
 const scout = new Engine(() => {});
@@ -170,9 +174,10 @@ const next = async () => {
   byId("work").setAttribute("aria-busy", "true");
   tell(isReady ? `${picture.file.name} is being solved.` : "The catalog of stars is being prepared.");
   try {
-    if (!isReady) glance(picture);
-    await engine.call("prepare");
-    isReady = true;
+    if (!wasReady) glance(picture);
+    const givenUp = new Promise((_, reject) => { giveUp = () => reject(new Stopped("stopped")); });
+    await Promise.race([engine.call("prepare"), givenUp]);
+    isReady = wasReady = true;
     tell(`${picture.file.name} is being solved.`);
     picture.result = await engine.call("solve", key(picture), picture.file, picture.options, picture.equipment);
     picture.state = "done";
@@ -323,7 +328,8 @@ export const photo = () => {
     add([...(event.dataTransfer?.files ?? [])]);
   });
   byId("cancel").addEventListener("click", () => {
-    engine.stop();
+    if (isReady) engine.stop();
+    else giveUp();
     scout.stop();
   });
   byId("hint-form").addEventListener("submit", (event) => {
@@ -335,7 +341,7 @@ export const photo = () => {
   });
   engine.call("version").then((version) => { byId("version").textContent = version; }, (error) => tell(error.message, true));
   return engine.call("prepare").then(() => {
-    isReady = true;
+    isReady = wasReady = true;
     if (!running) tell("Ready for your picture.");
   }, (error) => { if (!(error instanceof Stopped)) tell(error.message, true); });
 };
