@@ -1,5 +1,5 @@
 //! The limiting magnitude of a star sensor, and which of its parameters is worth improving:
-//! `cargo run --release --no-default-features --example limiting_magnitude`
+//! `cargo run --release --no-default-features --features built-in-catalog --example limiting_magnitude`
 
 use starpipe::camera::data_sheet::Preset;
 use starpipe::model::sensitivity::{Extinction, Prediction, Scenario, ScenarioError};

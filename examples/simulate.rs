@@ -1,6 +1,6 @@
 //! Simulates what a camera records of the sky, and writes its true stars beside the frame:
 //!
-//! `cargo run --release --no-default-features --example simulate -- imx174-35mm 84 -1 orion.fits`
+//! `cargo run --release --no-default-features --features built-in-catalog --example simulate -- imx174-35mm 84 -1 orion.fits`
 //!
 //! The arguments are the name of a camera, right ascension and declination of the center in degrees,
 //! and a file to write, a TIFF if its name ends in `.tif`. The stars are in a file of that name that

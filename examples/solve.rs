@@ -1,7 +1,7 @@
 //! Solves photographs of the night sky: where each of them points and how certain that is, how faint
 //! it goes, and which of its stars have names.
 //!
-//! `cargo run --release --no-default-features --example solve -- fixtures/orion/orion.png`
+//! `cargo run --release --no-default-features --features built-in-catalog --example solve -- fixtures/orion/orion.png`
 //!
 //! Before the files, `--fov DEGREES` states the horizontal field of view, and `--near RA DEC` about
 //! where the center is, in degrees.

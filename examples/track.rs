@@ -1,9 +1,9 @@
 //! Follows the attitude of a camera from frame to frame: of a satellite that turns, simulated, or of
 //! a sequence of files, one every 0.2 s.
 //!
-//! `cargo run --release --no-default-features --example track`
+//! `cargo run --release --no-default-features --features built-in-catalog --example track`
 //!
-//! `cargo run --release --no-default-features --example track -- FRAME FRAME ...`
+//! `cargo run --release --no-default-features --features built-in-catalog --example track -- FRAME FRAME ...`
 
 use starpipe::camera::data_sheet::Preset;
 use starpipe::frame::{self, FrameError};

@@ -3,31 +3,14 @@
 //
 //     npm install playwright-core axe-core
 //     node scripts/check-pages.mjs PAGE.html... [--shots DIR]
-//
-// CHROMIUM names the browser, by default /usr/bin/chromium.
 import { readFileSync, statSync } from "node:fs";
-import { createRequire } from "node:module";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
+import { SETTLE_MS, accessible, check, conclude, launch, option, showLayer, watch, words, zoom } from "./in-chromium.mjs";
 
-// The packages are those of the current directory.
-const require = createRequire(path.join(process.cwd(), "package.json"));
-const { chromium } = require("playwright-core");
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
-
-const SETTLE_MS = 250;
 // Of a page without its pictures.
 const MOST_KB = 1500;
-const words = process.argv.slice(2);
-const at = words.indexOf("--shots");
-const shots = at < 0 ? null : words.splice(at, 2)[1];
-let failed = 0;
-const check = (isRight, what) => {
-  if (!isRight) {
-    failed += 1;
-    console.error(`  wrong: ${what}`);
-  }
-};
+const shots = option("--shots");
 
 // The tables of any page sort and filter.
 async function useTables(page) {
@@ -62,26 +45,16 @@ async function useTables(page) {
 }
 
 async function useFrame(page, shot) {
-  const view = page.locator("#view");
-  const box = () => view.getAttribute("viewBox");
+  const box = () => page.locator("#view").getAttribute("viewBox");
   const whole = await box();
-  await view.hover();
-  await page.mouse.wheel(0, -800);
-  await page.waitForTimeout(SETTLE_MS);
-  check((await box()) !== whole, "the wheel does not zoom");
-  await page.locator("[data-layer=residuals]").check();
-  await page.locator("[data-layer=unidentified]").check();
-  if (shot) await page.screenshot({ path: shot });
-  await view.focus();
-  await page.keyboard.press("0");
-  await page.waitForTimeout(SETTLE_MS);
-  check((await box()) === whole, "the key 0 does not show the whole frame");
+  await zoom(page, async () => {
+    await page.locator("[data-layer=residuals]").check();
+    await page.locator("[data-layer=unidentified]").check();
+    if (shot) await page.screenshot({ path: shot });
+  });
   const sky = page.locator("[data-layer=constellations]");
   if (await sky.count()) {
-    const line = page.locator("#view .constellations path").first();
-    check(!(await line.isVisible()), "constellations are shown before they are wanted");
-    await sky.check();
-    check(await line.isVisible(), "constellations are not shown");
+    await showLayer(page, "constellations");
     await sky.uncheck();
   }
   await page.locator("[data-layer=identified]").uncheck();
@@ -96,17 +69,12 @@ async function useFrame(page, shot) {
   check((await box()) !== whole, "a row does not show its star");
 }
 
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"],
-});
+const browser = await launch();
 for (const file of words) {
   const name = path.basename(file, ".html");
   for (const colorScheme of ["light", "dark"]) {
     const page = await browser.newPage({ viewport: { width: 1200, height: 1000 }, colorScheme });
-    page.on("console", (message) => check(!["error", "warning"].includes(message.type()), message.text()));
-    page.on("pageerror", (error) => check(false, String(error)));
-    page.on("request", (request) => check(/^(file|data):/.test(request.url()), `asks for ${request.url()}`));
+    watch(page, (url) => /^(file|data):/.test(url));
     await page.goto(pathToFileURL(path.resolve(file)).href);
     await page.waitForTimeout(SETTLE_MS);
     if (shots) await page.screenshot({ path: path.join(shots, `${name}-${colorScheme}.png`), fullPage: true });
@@ -114,9 +82,7 @@ for (const file of words) {
     check(await page.locator("header .answer").isVisible(), "no answer");
     if (await page.locator("#view").count()) await useFrame(page, shots && colorScheme === "dark" ? path.join(shots, `${name}-zoomed.png`) : null);
     await useTables(page);
-    await page.evaluate(axe);
-    const { violations } = await page.evaluate(() => globalThis.axe.run());
-    check(violations.length === 0, violations.map((v) => `${v.id}: ${v.nodes[0].html}`).join("; "));
+    await accessible(page, name);
     await page.close();
   }
   const html = readFileSync(file, "utf8");
@@ -126,4 +92,4 @@ for (const file of words) {
   console.log(`${name}: ${kilobytes.toFixed(0)} kB beside pictures of ${(pictures / 1000).toFixed(0)} kB`);
 }
 await browser.close();
-process.exitCode = failed ? 1 : 0;
+conclude("the pages do what they should");

@@ -94,6 +94,12 @@ impl Pages {
         })
     }
 
+    /// How many images can be found.
+    #[doc(hidden)]
+    pub const fn count(&self) -> usize {
+        self.count
+    }
+
     /// The number of the next image; `None` after the last. Read it with [`Self::image`].
     pub fn advance(&mut self) -> Option<NonZeroUsize> {
         self.next += 1;

@@ -111,6 +111,16 @@ fn the_built_in_catalog_is_what_the_import_of_its_source_makes() {
 }
 
 #[test]
+fn the_bright_stars_are_those_of_the_built_in_catalog() {
+    let made = Catalog::built_in().limited_to(6.5).to_compact();
+    let committed = fs::read(catalogs().join("sky2000-bright.bin")).unwrap();
+    assert!(
+        committed == made,
+        "catalogs/sky2000-bright.bin is out of date"
+    );
+}
+
+#[test]
 fn the_bright_csv_is_what_its_source_makes() {
     let Some(source) = sky2000_file() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -35,10 +35,11 @@ for (const [at, name] of TABS.entries()) {
 }
 addEventListener("hashchange", show);
 show();
-photo();
+const prepared = photo();
 
+// It loads all files once more, most of them from the browser's cache: what the visitor waits for comes first.
 if ("serviceWorker" in navigator) {
-  navigator.serviceWorker.register("sw.js").then(() => navigator.serviceWorker.ready).then(
+  prepared.then(() => navigator.serviceWorker.register("sw.js")).then(() => navigator.serviceWorker.ready).then(
     () => { byId("offline").textContent = "Ready to work offline."; },
     () => { byId("offline").textContent = "This browser does not keep it for offline use."; },
   );

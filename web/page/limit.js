@@ -30,6 +30,7 @@ const engine = new Engine(() => {});
 /** @type {{ name: string, about: string, parameters: { name: string, value: number | null }[] }[]} */ let presets = [];
 /** The values that differ from the preset, by parameter. @type {Record<string, number>} */ let values = {};
 /** @type {Promise<void> | null} */ let isSetUp = null;
+let areStarsAsked = false;
 
 /** @param {Slider} slider @param {number} step */
 const valueAt = ({ ends: [low, high], log }, step) => {
@@ -91,6 +92,14 @@ const changed = () => {
   history.replaceState(null, "", `#limit?${settings}`);
   clearTimeout(timer);
   timer = setTimeout(predict, WAIT_MS);
+};
+
+/** The catalog, for the faintest star to be expected: the rest of the model needs none. */
+const stars = async () => {
+  try {
+    await engine.call("stars");
+    predict();
+  } catch { /* that one number stays away */ }
 };
 
 let asked = 0;
@@ -189,5 +198,6 @@ export const showLimit = async (settings) => {
   values = {};
   for (const [name, text] of settings) if (known.has(name) && text !== "" && Number.isFinite(Number(text))) values[name] = Number(text);
   fillSliders();
-  predict();
+  await predict();
+  areStarsAsked ||= Boolean(stars());
 };

@@ -5,7 +5,7 @@ import { showFrame } from "./views.js";
 
 /** Stages as people are told of them, in their order. */
 const STAGES = [
-  ["index", "Index the catalog"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
+  ["catalog", "Load the catalog"], ["index", "Index it"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
   ["naming", "Name the stars"], ["photometry", "Measure brightness"],
 ];
 /** What a remedy of the report leads to: the field of the form, and the words of its button. */
@@ -20,6 +20,8 @@ const REMEDIES = {
 };
 /** Files that browsers show themselves. */
 const SHOWN_BY_BROWSER = /\.(jpe?g|png|bmp)$/i;
+/** Files that may have several images. */
+const HAS_IMAGES = /\.(tiff?|fits?|fts|fz|gz)$/i;
 
 /**
  * @typedef {object} Picture
@@ -27,6 +29,8 @@ const SHOWN_BY_BROWSER = /\.(jpe?g|png|bmp)$/i;
  * @property {number} number
  * @property {"waits" | "runs" | "done" | "failed"} state
  * @property {string} options
+ * @property {Record<string, File>} equipment
+ * @property {number} images
  * @property {{ json: string, html: string, data: string } | null} result
  * @property {string} error
  * @property {HTMLButtonElement} button
@@ -36,22 +40,35 @@ const SHOWN_BY_BROWSER = /\.(jpe?g|png|bmp)$/i;
 /** @type {Picture | null} */ let chosen = null;
 /** @type {Picture | null} */ let running = null;
 let isReady = false;
+/** Whether it ever was: the index is kept since, and soon there. */
+let wasReady = false;
+/** Ends the wait for the catalog, of which the preparation goes on. */
+let giveUp = () => {};
 const engine = new Engine((stage, share) => tellStage(stage, share));
+/** Shows and searches pictures among the bright stars, while the catalog is on its way. */
+const scout = new Engine(() => {});
 
-/** The options that the form states, as JSON. */
-const stated = () => {
+/** The options that the form states, as JSON: those of the chosen picture, or of a new one. */
+const stated = (isNew = false) => {
   const form = byId("hint-form");
   const pair = (text) => text.split(/[,\s]+/).filter(Boolean).map((part) => Number(part.replace("−", "-")));
   const options = {};
   for (const [name, given] of new FormData(form)) {
-    const text = String(given).trim();
-    if (!text) continue;
+    const text = given instanceof File ? "" : given.trim();
+    if (!text || (isNew && name === "image")) continue;
     if (name === "thorough") options.thorough = true;
     else if (name === "date") options.date = text;
     else if (name === "near_deg" || name === "site") options[name] = pair(text);
     else options[name] = Number(text);
   }
   return JSON.stringify(options);
+};
+
+/** The files that the form names: of the camera, and those that calibrate. */
+const equipment = () => {
+  const files = {};
+  for (const [name, given] of new FormData(byId("hint-form"))) if (given instanceof File && given.size) files[name] = given;
+  return files;
 };
 
 const tell = (text, isError = false) => {
@@ -69,7 +86,10 @@ const tellStage = (stage, share) => {
   byId("done").value = (at + share) / STAGES.length;
 };
 
-const key = (picture) => `${picture.number} ${picture.options}`;
+const key = ({ number, options, equipment }) => {
+  const files = Object.entries(equipment).map(([name, file]) => [name, file.name, file.size, file.lastModified]);
+  return JSON.stringify([number, options, files]);
+};
 
 const markOf = { waits: "…", runs: "◌", done: "●", failed: "!" };
 const label = (picture) => {
@@ -87,13 +107,14 @@ const add = (files) => {
     const button = document.createElement("button");
     button.type = "button";
     /** @type {Picture} */
-    const picture = { file, number: pictures.length, state: "waits", options: stated(), result: null, error: "", button };
+    const picture = { file, number: pictures.length, state: "waits", options: stated(true), equipment: equipment(), images: 1, result: null, error: "", button };
     button.addEventListener("click", () => choose(picture));
     const item = document.createElement("li");
     item.appendChild(button);
     byId("queue").appendChild(item);
     pictures.push(picture);
     label(picture);
+    countImages(picture);
     if (!running && pictures.every((one) => one === picture || one.state !== "waits")) choose(picture);
   }
   next();
@@ -105,9 +126,27 @@ const choose = (picture) => {
   byId("again").disabled = false;
   byId("answer").replaceChildren();
   byId("preview").hidden = true;
+  showImages(picture);
   if (picture.result) showResult(picture);
   else showPreview(picture);
   if (picture.state === "failed") tell(picture.error, true);
+};
+
+/** The choice of an image, in files with several. */
+const showImages = (picture) => {
+  byId("image-label").hidden = picture.images < 2;
+  byId("image").max = picture.images;
+  byId("image").disabled = picture.images < 2;
+  byId("image").value = JSON.parse(picture.options).image ?? "";
+  byId("image-count").textContent = String(picture.images);
+};
+
+const countImages = async (picture) => {
+  if (!HAS_IMAGES.test(picture.file.name)) return;
+  try {
+    picture.images = await scout.call("images", picture.file);
+  } catch { /* the solution tells why */ }
+  if (picture === chosen) showImages(picture);
 };
 
 const showPreview = async (picture) => {
@@ -120,7 +159,7 @@ const showPreview = async (picture) => {
   };
   if (SHOWN_BY_BROWSER.test(picture.file.name)) return show(picture.file);
   try {
-    show(new Blob([await engine.call("preview", await picture.file.arrayBuffer(), picture.file.name)], { type: "image/jpeg" }));
+    show(new Blob([await scout.call("preview", picture.file, JSON.parse(picture.options).image)], { type: "image/jpeg" }));
   } catch { /* the solution tells why */ }
 };
 
@@ -135,13 +174,14 @@ const next = async () => {
   byId("work").setAttribute("aria-busy", "true");
   tell(isReady ? `${picture.file.name} is being solved.` : "The catalog of stars is being prepared.");
   try {
-    const bytes = await picture.file.arrayBuffer();
-    await engine.call("prepare");
-    isReady = true;
+    if (!wasReady) glance(picture);
+    const givenUp = new Promise((_, reject) => { giveUp = () => reject(new Stopped("stopped")); });
+    await Promise.race([engine.call("prepare"), givenUp]);
+    isReady = wasReady = true;
     tell(`${picture.file.name} is being solved.`);
-    picture.result = await engine.call("solve", key(picture), bytes, picture.file.name, picture.options);
+    picture.result = await engine.call("solve", key(picture), picture.file, picture.options, picture.equipment);
     picture.state = "done";
-    tell(`${picture.file.name} is solved.`);
+    tell(`${picture.file.name} is done.`);
   } catch (error) {
     picture.state = "failed";
     picture.error = error instanceof Stopped ? `${picture.file.name} was canceled.` : error.message;
@@ -156,15 +196,29 @@ const next = async () => {
   next();
 };
 
+/** What the bright stars alone say, until the catalog is here. */
+const glance = async (picture) => {
+  try {
+    const report = JSON.parse(await scout.call("glance", picture.file, picture.options, picture.equipment));
+    if (picture !== running || isReady || report.status !== "identified") return;
+    tell(`The bright stars alone say: ${direction(report.attitude)}. The catalog of stars is being prepared for the full answer.`);
+  } catch { /* the full search tells why */ }
+};
+
+/** The field's centre in words. */
+const direction = ({ ra_deg, dec_deg }) => {
+  const minutes = Math.round(ra_deg * 4) % 1440;
+  return `right ascension ${Math.floor(minutes / 60)}\u00a0h ${minutes % 60}\u00a0min, declination ${dec_deg.toFixed(1).replace("-", "−")}°`;
+};
+
 /** The answer in a sentence. */
 const sentence = (report) => {
-  if (report.status !== "identified") return `The stars of ${report.frame} are not identified. ${report.reason ?? ""}`;
+  if (report.status !== "identified") return `The stars of ${report.frame} are not identified${report.reason ? `: ${report.reason}` : ""}.`;
   const { attitude, optics, match } = report;
   const named = report.stars.filter((star) => star.name).sort((a, b) => a.vmag - b.vmag)[0];
   const field = optics.fov_x_deg && optics.fov_y_deg ? `${optics.fov_x_deg.toFixed(2)}° × ${optics.fov_y_deg.toFixed(2)}°` : "a wide part";
-  const hours = attitude.ra_deg / 15, minutes = Math.round((hours % 1) * 60) % 60;
-  const brightest = named ? ` The brightest star with a name is ${named.name} (V ${named.vmag.toFixed(2)}).` : "";
-  return `${report.frame} shows ${field} of the sky around right ascension ${Math.floor(hours)} h ${minutes} min, declination ${attitude.dec_deg.toFixed(1).replace("-", "−")}°: ${match.matched} stars are identified, the faintest of V ${report.magnitude.faintest_vmag.toFixed(1)}.${brightest}`;
+  const brightest = named ? ` The brightest star with a name is ${named.name} (V\u00a0${named.vmag.toFixed(2)}).` : "";
+  return `${report.frame} shows ${field} of the sky around ${direction(attitude)}: ${match.matched} stars are identified, the faintest of V\u00a0${report.magnitude.faintest_vmag.toFixed(1)}.${brightest}`;
 };
 
 const showResult = (picture) => {
@@ -180,9 +234,12 @@ const showResult = (picture) => {
   view.className = "frame";
   // Names are escaped where the elements are made.
   view.innerHTML = picture.result.html;
+  // The sentence has the reason already.
+  if (report.status !== "identified") view.querySelector(".answer")?.remove();
   answer.append(view);
   showFrame(view, JSON.parse(picture.result.data));
-  tell(`${picture.file.name} is solved in ${(report.timing_ms.total / 1000).toFixed(1)} s.`);
+  const took = `${(report.timing_ms.total / 1000).toFixed(2)} s`;
+  tell(report.status === "identified" ? `${picture.file.name} is solved, in ${took}.` : `${picture.file.name} has no answer, after ${took}.`);
 };
 
 const actions = (name, items) => {
@@ -221,8 +278,7 @@ const downloads = (picture, report) => {
   const stem = picture.file.name.replace(/(\.fits)?\.[^.]*$/i, "");
   const draw = async (kind, type, extension) => {
     try {
-      const bytes = await picture.file.arrayBuffer();
-      const made = await engine.call("draw", key(picture), bytes, picture.file.name, picture.options, kind, layers());
+      const made = await engine.call("draw", key(picture), picture.file, picture.options, picture.equipment, kind, layers());
       save(new Blob([made], { type }), `${stem}.${extension}`);
     } catch (error) {
       tell(error.message, true);
@@ -257,7 +313,7 @@ const remedies = (picture, report) => {
   return group;
 };
 
-/** Sets the tab up, and prepares the catalog while the visitor looks for a picture. */
+/** Sets the tab up, and prepares the catalog while the visitor looks for a picture: resolves when that is over. */
 export const photo = () => {
   for (const [, text] of STAGES) byId("stages").appendChild(Object.assign(document.createElement("li"), { textContent: text }));
   for (const id of ["files", "camera"]) {
@@ -271,17 +327,21 @@ export const photo = () => {
     drop.classList.remove("over");
     add([...(event.dataTransfer?.files ?? [])]);
   });
-  byId("cancel").addEventListener("click", () => engine.stop());
+  byId("cancel").addEventListener("click", () => {
+    if (isReady) engine.stop();
+    else giveUp();
+    scout.stop();
+  });
   byId("hint-form").addEventListener("submit", (event) => {
     event.preventDefault();
     if (!chosen || chosen.state === "runs") return;
-    Object.assign(chosen, { state: "waits", options: stated(), result: null, error: "" });
+    Object.assign(chosen, { state: "waits", options: stated(), equipment: equipment(), result: null, error: "" });
     choose(chosen);
     next();
   });
   engine.call("version").then((version) => { byId("version").textContent = version; }, (error) => tell(error.message, true));
-  engine.call("prepare").then(() => {
-    isReady = true;
+  return engine.call("prepare").then(() => {
+    isReady = wasReady = true;
     if (!running) tell("Ready for your picture.");
   }, (error) => { if (!(error instanceof Stopped)) tell(error.message, true); });
 };

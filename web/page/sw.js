@@ -3,9 +3,19 @@
 const CACHE = "CACHE-NAME";
 const FILES = ["FILES"];
 
-addEventListener("install", (event) => {
-  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(FILES)).then(() => skipWaiting()));
-});
+/** A file whose name has its hash is the same in every version: what is kept of it is not loaded again. */
+const HAS_HASH = /-[0-9a-f]{16}\.bin$/;
+
+const keep = async () => {
+  const cache = await caches.open(CACHE);
+  await Promise.all(FILES.map(async (file) => {
+    const kept = HAS_HASH.test(file) && await caches.match(file);
+    await (kept ? cache.put(file, kept) : cache.add(file));
+  }));
+  await skipWaiting();
+};
+
+addEventListener("install", (event) => event.waitUntil(keep()));
 addEventListener("activate", (event) => {
   const old = (names) => names.filter((name) => name.startsWith("starpipe-") && name !== CACHE);
   event.waitUntil(caches.keys().then((names) => Promise.all(old(names).map((name) => caches.delete(name)))).then(() => clients.claim()));

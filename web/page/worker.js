@@ -1,35 +1,142 @@
 // The thread that computes. A message { id, call, values } is answered by { id, value } or { id, error, isFatal };
 // { stage, share } between them tells how far it is.
+import { NUMBERS, STARS } from "./files.js";
 import init, * as starpipe from "./starpipe.js";
 
-globalThis.starpipeProgress = (stage, share) => postMessage({ stage, share });
+/** The browser's storage for the index of the catalog. */
+const INDEX_CACHE = "index-of-starpipe";
+
+const progress = (stage, share) => postMessage({ stage, share });
+Object.assign(globalThis, { starpipeProgress: progress });
 const ready = init({ module_or_path: new URL("starpipe_bg.wasm", import.meta.url) });
-let solver;
+
+/** What `make` resolves to: made once, or again after it failed. @template T @param {() => Promise<T>} make */
+const once = (make) => {
+  /** @type {Promise<T> | null} */ let made = null;
+  return () => (made ??= make().catch((error) => { made = null; throw error; }));
+};
+
+/**
+ * The content of a file of the page that is compressed with gzip.
+ * @param {{ name: string }} file
+ * @param {(bytes: number) => void} onBytes
+ */
+const unpacked = async ({ name }, onBytes) => {
+  const failed = (why) => new Error(`the catalog of stars could not be loaded: ${why}`);
+  const response = await fetch(new URL(name, import.meta.url)).catch((error) => { throw failed(error.message); });
+  if (!response.ok || !response.body) throw failed(`${response.status} ${response.statusText}`);
+  const count = new TransformStream({
+    transform(chunk, out) {
+      onBytes(chunk.byteLength);
+      out.enqueue(chunk);
+    },
+  });
+  const content = response.body.pipeThrough(count).pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(content).arrayBuffer().catch((error) => { throw failed(error.message); }));
+};
+
+const openCatalog = once(async () => starpipe.open_catalog(await unpacked(STARS, () => {})));
+
+/** The catalog, and the numbers of its stars. */
+const openAll = once(async () => {
+  let received = 0;
+  const onBytes = (bytes) => {
+    received += bytes;
+    progress("catalog", Math.min(received / (STARS.bytes + NUMBERS.bytes), 1));
+  };
+  const [stars, numbers] = await Promise.all([STARS, NUMBERS].map((file) => unpacked(file, onBytes)));
+  starpipe.open_catalog(stars);
+  starpipe.open_numbers(numbers);
+  progress("catalog", 1);
+});
+
+const keptIndex = async (name) => {
+  try {
+    const kept = await (await caches.open(INDEX_CACHE)).match(name);
+    return kept && new Uint8Array(await kept.arrayBuffer());
+  } catch {
+    return undefined;
+  }
+};
+
+/** Where the browser has no room for it, the index is built again at the next visit. */
+const keepIndex = async (name, bytes) => {
+  try {
+    const cache = await caches.open(INDEX_CACHE);
+    const old = (await cache.keys()).filter(({ url }) => !url.endsWith(`/${name}`));
+    await Promise.all(old.map((request) => cache.delete(request)));
+    await cache.put(name, new Response(bytes));
+  } catch { /* as it was before */ }
+};
+
+/** The whole catalog, indexed. */
+const openSolver = once(async () => {
+  await openAll();
+  const name = starpipe.index_name();
+  const solver = new starpipe.Solver(await keptIndex(name));
+  const built = solver.built_index();
+  if (built) keepIndex(name, built);
+  progress("index", 1);
+  return solver;
+});
+
+/** The bright stars, indexed: within the module, and soon done. @type {starpipe.Solver | null} */
+let brightSolver = null;
 /** The frame that was solved last, and what it was solved from. */
 let last = { key: "", solved: null };
 
-const solverOf = () => (solver ??= new starpipe.Solver());
+/** @param {File} file */
+const bytesOf = async (file) => new Uint8Array(await file.arrayBuffer());
 
-const solve = (key, bytes, name, options) => {
+/** @typedef {{ camera?: File, dark?: File, flat?: File }} EquipmentFiles */
+
+/** @param {EquipmentFiles} files */
+const equipmentOf = async ({ camera, dark, flat }) => {
+  const [ofCamera, ofDark, ofFlat] = await Promise.all([camera, dark, flat].map(async (file) => file && new starpipe.GivenFile(file.name, await bytesOf(file))));
+  return new starpipe.Equipment(ofCamera, ofDark, ofFlat);
+};
+
+/** @param {starpipe.Solver} solver @param {File} file @param {string} options @param {EquipmentFiles} files */
+const solveWith = async (solver, file, options, files) => {
+  const [bytes, equipment] = await Promise.all([bytesOf(file), equipmentOf(files)]);
+  try {
+    return solver.solve(bytes, file.name, options, equipment);
+  } finally {
+    equipment.free();
+  }
+};
+
+const solve = async (key, file, options, files) => {
+  const solver = await openSolver();
   if (last.key !== key) {
     last.solved?.free();
     last = { key: "", solved: null };
-    last = { key, solved: solverOf().solve(new Uint8Array(bytes), name, options) };
+    last = { key, solved: await solveWith(solver, file, options, files) };
   }
   return last.solved;
 };
 
 const calls = {
   version: () => starpipe.version(),
-  prepare: () => { solverOf(); },
-  preview: (bytes, name) => starpipe.preview(new Uint8Array(bytes), name),
-  solve: (key, bytes, name, options) => {
-    const solved = solve(key, bytes, name, options);
+  prepare: async () => { await openSolver(); },
+  stars: openCatalog,
+  images: async (file) => starpipe.image_count(await bytesOf(file)),
+  preview: async (file, image) => starpipe.preview(await bytesOf(file), file.name, image),
+  /** The report of a search among the bright stars alone. */
+  glance: async (file, options, files) => {
+    brightSolver ??= starpipe.Solver.of_bright_stars();
+    const solved = await solveWith(brightSolver, file, options, files);
+    const report = solved.json();
+    solved.free();
+    return report;
+  },
+  solve: async (key, file, options, files) => {
+    const solved = await solve(key, file, options, files);
     const [html, data] = solved.view();
     return { json: solved.json(), html, data };
   },
-  draw: (key, bytes, name, options, kind, layers) => {
-    const solved = solve(key, bytes, name, options);
+  draw: async (key, file, options, files, kind, layers) => {
+    const solved = await solve(key, file, options, files);
     return kind === "overlay" ? solved.overlay(layers) : solved[kind]();
   },
   limit: (stated) => starpipe.limit(stated),
@@ -41,7 +148,7 @@ const calls = {
 onmessage = async ({ data: { id, call, values } }) => {
   try {
     await ready;
-    postMessage({ id, value: calls[call](...values) });
+    postMessage({ id, value: await calls[call](...values) });
   } catch (error) {
     // A trap leaves the module in an unknown state.
     const isFatal = error instanceof WebAssembly.RuntimeError || error instanceof RangeError;

@@ -3,15 +3,19 @@
 //! Values that have fields come and go as JSON, as the program prints it. All of it runs on the thread that
 //! calls; what takes long tells `starpipeProgress`, a function of that thread, how far it is.
 
+mod catalogs;
 mod defocus;
+mod equipment;
 mod limit;
 mod options;
 mod solver;
 mod stated;
 
+pub use catalogs::{index_name, open_catalog, open_numbers};
 pub use defocus::defocus;
+pub use equipment::{Equipment, GivenFile};
 pub use limit::{limit, limit_curve, parameters};
-pub use solver::{Solved, Solver, preview};
+pub use solver::{Solved, Solver, image_count, preview};
 
 use serde::Serialize;
 use std::error::Error;

@@ -1,14 +1,14 @@
 //! The limiting magnitude of a camera.
 
 use crate::stated::Stated;
-use crate::{json, told};
+use crate::{catalogs, json, told};
 use serde::{Deserialize, Serialize};
-use starpipe::Catalog;
 use starpipe::camera::data_sheet::Preset;
 use starpipe::model::sensitivity::{Parameter, PredictionRow, Scenario, Spacing, Sweep};
 use wasm_bindgen::prelude::*;
 
-/// The prediction for a camera, as `starpipe limit --format json` prints it.
+/// The prediction for a camera, as `starpipe limit --format json` prints it. Until the catalog was given,
+/// the faintest star to be expected is `null`.
 ///
 /// # Errors
 /// A camera that is none, values outside their limits, and a scenario without a limit.
@@ -16,7 +16,12 @@ use wasm_bindgen::prelude::*;
 pub fn limit(stated: &str) -> Result<String, JsError> {
     let stated: Stated = serde_json::from_str(stated).map_err(told)?;
     let (scenario, preset) = (stated.scenario()?, stated.preset()?);
-    let row = PredictionRow::new(&scenario, Some(preset), Catalog::built_in()).map_err(told)?;
+    let catalog = catalogs::whole();
+    let stars = *catalog.as_ref().unwrap_or(&catalogs::bright());
+    let mut row = PredictionRow::new(&scenario, Some(preset), stars).map_err(told)?;
+    if catalog.is_err() {
+        row.faintest = None;
+    }
     json(&row)
 }
 

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use starpipe::identify::Effort;
 use starpipe::sky::observer::Site;
 use starpipe::{ObservationDate, SolveOptions};
+use std::num::NonZeroUsize;
 use wasm_bindgen::JsError;
 
 /// The options, named as those of `starpipe process` with their units; what is absent has its default.
@@ -22,13 +23,15 @@ struct Stated {
     thorough: bool,
     sky: bool,
     time_limit_s: Option<f64>,
+    /// Of a file with several.
+    image: Option<NonZeroUsize>,
 }
 
-/// The options of the library.
+/// The options of the library, and the number of the image that is meant.
 ///
 /// # Errors
 /// JSON that is none, and values outside their limits.
-pub(crate) fn resolve(text: &str) -> Result<SolveOptions, JsError> {
+pub(crate) fn resolve(text: &str) -> Result<(SolveOptions, Option<NonZeroUsize>), JsError> {
     let stated: Stated = serde_json::from_str(text).map_err(told)?;
     let mut options = SolveOptions::default();
     options.fov_deg = within("the field of view", stated.fov_deg, 0.0, 360.0)?;
@@ -51,7 +54,7 @@ pub(crate) fn resolve(text: &str) -> Result<SolveOptions, JsError> {
     options.sky = stated.sky;
     // Who waits may end it.
     options.time_limit_s = stated.time_limit_s;
-    Ok(options)
+    Ok((options, stated.image))
 }
 
 /// A value above `low` and up to `high`.

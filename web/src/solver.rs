@@ -1,55 +1,90 @@
 //! Photographs: the pipeline, and what is made of its result.
 
-use crate::{options, progress, told};
+use crate::equipment::Equipment;
+use crate::{catalogs, options, progress, told};
 use serde::Deserialize;
-use starpipe::frame::{self, Buffers, Colors};
+use starpipe::frame::{self, Buffers, Colors, Pages};
 use starpipe::pipeline::{self, Stage};
 use starpipe::report::overlay::{self, OverlayFormat, OverlayOptions, Rings, Shown, SkyLayers};
 use starpipe::report::{page, wcs};
 use starpipe::{Catalog, Context, Frame, FrameReport, IndexedCatalog, Solution, Workspace};
+use std::num::NonZeroUsize;
 use std::path::Path;
 use wasm_bindgen::prelude::*;
 
 /// Width of a preview, in pixels.
 const PREVIEW_PX: usize = 1000;
 
-/// The built-in catalog with its index, and buffers.
+/// A catalog with its index, and buffers.
 #[wasm_bindgen]
 pub struct Solver {
     indexed: IndexedCatalog<'static>,
+    is_built: bool,
     workspace: Workspace,
 }
 
 #[wasm_bindgen]
 impl Solver {
-    /// Indexes the catalog.
-    #[allow(clippy::new_without_default, reason = "it takes seconds")]
+    /// The whole catalog with the index in these bytes; without bytes, or with damaged ones, it is
+    /// indexed anew.
+    ///
+    /// # Errors
+    /// Before the catalog was given.
     #[wasm_bindgen(constructor)]
-    pub fn new() -> Self {
+    pub fn new(index: Option<Vec<u8>>) -> Result<Self, JsError> {
+        let catalog = catalogs::whole()?;
+        let kept = index.and_then(|bytes| IndexedCatalog::with_index_bytes(catalog, bytes).ok());
+        let is_built = kept.is_none();
+        let build = || IndexedCatalog::build(catalog, &|share| progress("index", share));
+        Ok(Self {
+            indexed: kept.unwrap_or_else(build),
+            is_built,
+            workspace: Workspace::new(),
+        })
+    }
+
+    /// The stars to V = 6.5 with their index, which is built in a fraction of a second.
+    pub fn of_bright_stars() -> Self {
         Self {
-            indexed: IndexedCatalog::build(Catalog::built_in(), &|share| progress("index", share)),
+            indexed: IndexedCatalog::build(catalogs::bright(), &|_| ()),
+            is_built: true,
             workspace: Workspace::new(),
         }
+    }
+
+    /// The index, to be kept, if it was built here.
+    pub fn built_index(&self) -> Option<Vec<u8>> {
+        self.is_built.then(|| self.indexed.index_bytes())
     }
 
     /// Solves the frame in the file with this content and name.
     ///
     /// # Errors
     /// A file that is no frame, or options that are none.
-    pub fn solve(&mut self, bytes: Vec<u8>, name: &str, options: &str) -> Result<Solved, JsError> {
-        let options = options::resolve(options)?;
+    pub fn solve(
+        &mut self,
+        bytes: Vec<u8>,
+        name: &str,
+        options: &str,
+        equipment: &Equipment,
+    ) -> Result<Solved, JsError> {
+        let (options, image) = options::resolve(options)?;
         let on_stage = |stage: Stage| progress(stage_name(stage), 1.0);
-        let mut context = Context::new(&self.indexed).with_options(&options, None);
+        let camera = equipment.camera.clone();
+        let mut context = Context::new(&self.indexed).with_options(&options, camera);
+        context.calibration = equipment.calibration.as_ref();
         context.on_stage = Some(&on_stage);
         let path = Path::new(name);
         let read = |buffers: &mut Buffers| {
-            let decoded = frame::decode_page_with(&bytes, None, buffers);
+            let decoded = frame::decode_page_with(&bytes, image, buffers);
             decoded.map_err(|error| error.in_file(path))
         };
         let solved = pipeline::solve_read(path, read, &context, &mut self.workspace);
         let (solution, frame) = solved.map_err(told)?;
-        let report = FrameReport::new(name, &solution, self.indexed.catalog());
+        let catalog = self.indexed.catalog();
+        let report = FrameReport::new(name, &solution, catalog);
         Ok(Solved {
+            catalog,
             bytes,
             frame,
             solution,
@@ -73,6 +108,7 @@ fn stage_name(stage: Stage) -> &'static str {
 /// A solved frame.
 #[wasm_bindgen]
 pub struct Solved {
+    catalog: &'static Catalog,
     bytes: Vec<u8>,
     frame: Frame<'static>,
     solution: Solution,
@@ -130,8 +166,8 @@ impl Solved {
         sky.equatorial_grid = layers.equatorial;
         sky.horizontal_grid = layers.horizontal;
         options.sky = sky;
-        let catalog = Catalog::built_in();
-        let draw = |shown: &Shown<'_>| overlay::encoded(shown, &self.solution, catalog, &options);
+        let draw =
+            |shown: &Shown<'_>| overlay::encoded(shown, &self.solution, self.catalog, &options);
         self.shown(draw).map_err(told)
     }
 
@@ -166,13 +202,24 @@ impl Solved {
     }
 }
 
-/// The frame in a file that browsers cannot show, as JPEG.
+/// How many images are in a file.
+///
+/// # Errors
+/// A file without an image.
+#[wasm_bindgen]
+pub fn image_count(bytes: Vec<u8>) -> Result<usize, JsError> {
+    let pages = Pages::of(bytes, &mut Buffers::new()).map_err(told)?;
+    Ok(pages.count())
+}
+
+/// The frame in a file that browsers cannot show, as JPEG: its image of this number from 1, or its main one.
 ///
 /// # Errors
 /// A file that is no frame.
 #[wasm_bindgen]
-pub fn preview(bytes: &[u8], name: &str) -> Result<Vec<u8>, JsError> {
-    let decoded = frame::decode_page_with(bytes, None, &mut Buffers::new());
+pub fn preview(bytes: &[u8], name: &str, image: Option<usize>) -> Result<Vec<u8>, JsError> {
+    let image = image.and_then(NonZeroUsize::new);
+    let decoded = frame::decode_page_with(bytes, image, &mut Buffers::new());
     let frame = decoded.map_err(|error| told(error.in_file(Path::new(name))))?;
     page::preview(&frame, PREVIEW_PX).map_err(told)
 }

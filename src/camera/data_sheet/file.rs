@@ -71,9 +71,17 @@ impl CameraDescription {
     /// [`DataSheetError`] with the file, the line and the key.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, DataSheetError> {
         let path = path.as_ref();
-        let text = text_of(path)?;
-        let lens = lens_table::parse(path, &text)?.map(Arc::new);
-        let file = SheetFile::parse(path, &text)?;
+        Self::parse(path, &text_of(path)?)
+    }
+
+    /// Parses the text of such a file; `path` is its name.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    #[doc(hidden)]
+    pub fn parse(path: &Path, text: &str) -> Result<Self, DataSheetError> {
+        let lens = lens_table::parse(path, text)?.map(Arc::new);
+        let file = SheetFile::parse(path, text)?;
         let is_lens_alone = lens.is_some() && file.table.is_empty();
         let sheet = (!is_lens_alone).then(|| file.data_sheet()).transpose()?;
         Ok(Self { sheet, lens })

@@ -25,10 +25,10 @@
 use super::table::{CELLS, CHUNKS, SizeClass, TRIANGLE_BYTES, Triangle};
 use crate::base::files;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 const MAGIC: [u8; 16] = *b"starpipe index\r\n";
@@ -66,17 +66,45 @@ pub enum CacheError {
 
 /// The file in `directory` for the index of the catalog with this checksum.
 pub fn index_path(directory: &Path, catalog_checksum: u64) -> PathBuf {
-    directory.join(format!(
-        "triangles-{catalog_checksum:016x}-v{FORMAT_VERSION}.bin"
-    ))
+    directory.join(index_name(catalog_checksum))
+}
+
+/// The name of that file.
+pub fn index_name(catalog_checksum: u64) -> String {
+    format!("triangles-{catalog_checksum:016x}-v{FORMAT_VERSION}.bin")
 }
 
 /// An open file, from which chunks are read.
 #[derive(Debug)]
 pub struct IndexFile {
     path: PathBuf,
-    file: Mutex<File>,
+    content: Mutex<Content>,
     classes: Vec<StoredClass>,
+}
+
+/// Where the bytes of an index are.
+#[derive(Debug)]
+enum Content {
+    File(File),
+    Memory(Cursor<Vec<u8>>),
+}
+
+impl Read for Content {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(bytes),
+            Self::Memory(memory) => memory.read(bytes),
+        }
+    }
+}
+
+impl Seek for Content {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match self {
+            Self::File(file) => file.seek(to),
+            Self::Memory(memory) => memory.seek(to),
+        }
+    }
 }
 
 /// The triangles of a class in the file.
@@ -128,7 +156,7 @@ impl IndexFile {
         checksum: &mut Xxh3,
     ) -> io::Result<Box<[Triangle]>> {
         const BLOCK: usize = 4096;
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut file = self.content();
         file.seek(SeekFrom::Start(start))?;
         let mut triangles = Vec::with_capacity(count);
         let mut block = vec![0; BLOCK.min(count) * TRIANGLE_BYTES];
@@ -142,10 +170,16 @@ impl IndexFile {
         Ok(triangles.into())
     }
 
+    fn content(&self) -> MutexGuard<'_, Content> {
+        self.content.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Deletes the file, so that the next process writes it again; returns `error`.
     fn delete_after(&self, error: CacheError) -> CacheError {
-        // A file that cannot be deleted is reported again by the next process.
-        let _ = std::fs::remove_file(&self.path);
+        if let Content::File(_) = *self.content() {
+            // A file that cannot be deleted is reported again by the next process.
+            let _ = std::fs::remove_file(&self.path);
+        }
         error
     }
 }
@@ -189,13 +223,33 @@ pub fn load(
     path: &Path,
     catalog_checksum: u64,
 ) -> Result<Option<(Vec<SizeClass>, IndexFile)>, CacheError> {
+    match files::open(path) {
+        Ok(file) => open(path, Content::File(file), catalog_checksum).map(Some),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(io_error("reading", path)(error)),
+    }
+}
+
+/// Opens the index in `bytes`, as [`load`] does that in a file.
+///
+/// # Errors
+/// [`CacheError::Damaged`].
+pub fn from_bytes(
+    bytes: Vec<u8>,
+    catalog_checksum: u64,
+) -> Result<(Vec<SizeClass>, IndexFile), CacheError> {
+    let content = Content::Memory(Cursor::new(bytes));
+    open(Path::new("in memory"), content, catalog_checksum)
+}
+
+fn open(
+    path: &Path,
+    mut file: Content,
+    catalog_checksum: u64,
+) -> Result<(Vec<SizeClass>, IndexFile), CacheError> {
     let (io_error, damaged) = (io_error("reading", path), damaged(path));
-    let mut file = match files::open(path) {
-        Ok(file) => file,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(io_error(error)),
-    };
-    let length = file.metadata().map_err(&io_error)?.len();
+    let length = file.seek(SeekFrom::End(0)).map_err(&io_error)?;
+    file.rewind().map_err(&io_error)?;
     let mut found = [0; HEADER_BYTES];
     let mut table = Vec::new();
     if length >= HEADER_BYTES as u64 {
@@ -203,7 +257,7 @@ pub fn load(
         let stated = u64::from_le_bytes([32, 33, 34, 35, 36, 37, 38, 39].map(|i| found[i]));
         let most = (MAX_CLASSES * CLASS_BYTES) as u64;
         let room = stated.min(most);
-        (&file)
+        (&mut file)
             .take(room)
             .read_to_end(&mut table)
             .map_err(&io_error)?;
@@ -222,10 +276,10 @@ pub fn load(
     }
     let file = IndexFile {
         path: path.to_owned(),
-        file: Mutex::new(file),
+        content: Mutex::new(file),
         classes: stored,
     };
-    Ok(Some((classes, file)))
+    Ok((classes, file))
 }
 
 /// The classes in a table, and their triangles in the file.
@@ -260,13 +314,34 @@ pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Resul
     files::make_directory(directory).map_err(&io_error)?;
     let file = files::beside(path).map_err(&io_error)?;
     let mut out = io::BufWriter::new(file.as_file());
-    let (mut table, mut triangles) = (Vec::new(), Vec::new());
-    for class in classes {
+    write(&mut out, catalog_checksum, classes)
+        .and_then(|()| out.flush())
+        .map_err(&io_error)?;
+    drop(out);
+    file.persist(path).map_err(|error| io_error(error.error))?;
+    Ok(())
+}
+
+/// The bytes that [`store`] writes.
+pub fn to_bytes(catalog_checksum: u64, classes: &[SizeClass]) -> Vec<u8> {
+    let triangles: usize = classes.iter().map(SizeClass::len).sum();
+    let table = classes.len() * CLASS_BYTES;
+    let mut out = Vec::with_capacity(HEADER_BYTES + table + triangles * TRIANGLE_BYTES);
+    write(&mut out, catalog_checksum, classes).expect("memory takes what is written");
+    out
+}
+
+fn write(out: &mut impl Write, catalog_checksum: u64, classes: &[SizeClass]) -> io::Result<()> {
+    let chunks_of = |class: &SizeClass| {
         let chunks = class.chunks.iter().map(|chunk| {
             let triangles = chunk.get().into_iter().flatten();
             triangles.flat_map(|triangle| triangle.to_bytes()).collect()
         });
-        let chunks: Vec<Vec<u8>> = chunks.collect();
+        chunks.collect::<Vec<Vec<u8>>>()
+    };
+    let mut table = Vec::with_capacity(classes.len() * CLASS_BYTES);
+    for class in classes {
+        let chunks = chunks_of(class);
         table.extend(class.low.to_le_bytes());
         table.extend(class.high.to_le_bytes());
         table.extend(chunks.iter().flat_map(|chunk| xxh3_64(chunk).to_le_bytes()));
@@ -276,16 +351,12 @@ pub fn store(path: &Path, catalog_checksum: u64, classes: &[SizeClass]) -> Resul
                 .iter()
                 .flat_map(|start| start.to_le_bytes()),
         );
-        triangles.extend(chunks);
     }
-    out.write_all(&header(catalog_checksum, &table))
-        .and_then(|()| out.write_all(&table))
-        .and_then(|()| triangles.iter().try_for_each(|chunk| out.write_all(chunk)))
-        .and_then(|()| out.flush())
-        .map_err(&io_error)?;
-    drop(out);
-    file.persist(path).map_err(|error| io_error(error.error))?;
-    Ok(())
+    out.write_all(&header(catalog_checksum, &table))?;
+    out.write_all(&table)?;
+    // Made twice, so that they are not all in memory twice.
+    let mut chunks = classes.iter().flat_map(chunks_of);
+    chunks.try_for_each(|chunk| out.write_all(&chunk))
 }
 
 #[cfg(test)]

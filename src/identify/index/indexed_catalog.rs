@@ -3,7 +3,7 @@
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
 use super::packed_vectors::PackedVectors;
-use super::table::{Place, Triangle};
+use super::table::{CHUNKS, Place, Triangle};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
@@ -53,8 +53,9 @@ pub struct IndexedCatalog<'a> {
     counts: MagnitudeCounts,
 }
 
+#[cfg(any(feature = "built-in-catalog", test))]
 impl IndexedCatalog<'static> {
-    /// The built-in catalog, indexed as by [`new`](Self::new).
+    /// The built-in catalog, indexed as by [`new`](Self::new). Needs the feature `built-in-catalog`.
     pub fn built_in() -> Self {
         Self::new(Catalog::built_in())
     }
@@ -113,6 +114,36 @@ impl<'a> IndexedCatalog<'a> {
         };
         indexed.triangles.cache_errors().extend(errors);
         Ok(indexed)
+    }
+
+    /// Reads the index of `catalog` from bytes that [`index_bytes`](Self::index_bytes) returned.
+    ///
+    /// # Errors
+    /// [`CacheError::Damaged`] if the bytes are not the index of this catalog.
+    #[doc(hidden)]
+    pub fn with_index_bytes(catalog: &'a Catalog, bytes: Vec<u8>) -> Result<Self, CacheError> {
+        let (classes, file) = cache::from_bytes(bytes, catalog.checksum())?;
+        Ok(Self::with_index(
+            catalog,
+            TriangleIndex::new(classes, Some(file)),
+        ))
+    }
+
+    /// The index as the file in a cache directory has it, for programs that keep it elsewhere.
+    #[doc(hidden)]
+    pub fn index_bytes(&self) -> Vec<u8> {
+        for class in 0..self.triangles.classes.len() {
+            for chunk in 0..CHUNKS {
+                self.triangles.chunk(self.stars(), class, chunk);
+            }
+        }
+        cache::to_bytes(self.catalog.checksum(), &self.triangles.classes)
+    }
+
+    /// The name of the index of `catalog`: it changes with the catalog and with the format.
+    #[doc(hidden)]
+    pub fn index_name(catalog: &Catalog) -> String {
+        cache::index_name(catalog.checksum())
     }
 
     /// Builds the index of `catalog` without a cache; calls `progress` with the share done.
@@ -249,6 +280,29 @@ mod tests {
         assert!(!indexed.triangles.is_empty());
         assert!(!indexed.take_cache_errors().is_empty());
         assert!(indexed.take_cache_errors().is_empty());
+    }
+
+    #[test]
+    fn an_index_that_is_kept_as_bytes_is_that_of_the_file() {
+        let catalog = small_catalog();
+        let directory = tempfile::tempdir().unwrap();
+        let built = IndexedCatalog::open(&catalog, Some(directory.path()), &|_| ());
+        let name = IndexedCatalog::index_name(&catalog);
+        let bytes = std::fs::read(directory.path().join(name)).unwrap();
+        assert_eq!(built.index_bytes(), bytes);
+        let read = IndexedCatalog::with_index_bytes(&catalog, bytes.clone()).unwrap();
+        assert_eq!(read.index_bytes(), bytes);
+        for damaged in [&[], &bytes[1..], &bytes[..bytes.len() - 1]] {
+            assert!(IndexedCatalog::with_index_bytes(&catalog, damaged.to_vec()).is_err());
+        }
+        let other = catalog.limited_to(3.0);
+        let error = IndexedCatalog::with_index_bytes(&other, bytes)
+            .err()
+            .unwrap();
+        assert!(
+            error.to_string().contains("in memory is damaged"),
+            "{error}"
+        );
     }
 
     /// If this fails, raise the version of the file: caches hold the earlier index.

@@ -4,12 +4,20 @@
 //! HD, SAO and HR numbers are SKY2000's own. Hipparcos numbers are those of van Leeuwen 2007
 //! (CDS I/311), matched by position. `catalogs/README.md` describes the file.
 
-use super::compact::ByteReader;
+use super::compact::{ByteReader, invalid};
+use super::error::{CompactError, quoted};
 use super::id::{HipparcosId, StarId};
 use std::sync::OnceLock;
 
-const FILE: &[u8] = include_bytes!("../../../catalogs/star-numbers.bin");
-const MAGIC_BYTES: usize = 8;
+#[cfg(any(feature = "built-in-catalog", test))]
+const BUILT_IN: &[u8] = include_bytes!("../../../catalogs/star-numbers.bin");
+const MAGIC: [u8; 8] = *b"\x89STARNUM";
+const HEADER_BYTES: usize = 16;
+/// Of a star, and of one with an HR number beyond that.
+const STAR_BYTES: u64 = 13;
+const HR_BYTES: u64 = 6;
+
+static TABLE: OnceLock<Numbers> = OnceLock::new();
 
 /// The columns of the file, which are read where they lie; a number of 0 is none.
 struct Numbers {
@@ -24,20 +32,37 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn open() -> Self {
+    /// The table in use: the one that was given, else the built-in one.
+    fn table() -> Option<&'static Self> {
+        #[cfg(any(feature = "built-in-catalog", test))]
+        return Some(TABLE.get_or_init(|| Self::open(BUILT_IN).expect("a test checks it")));
+        #[cfg(not(any(feature = "built-in-catalog", test)))]
+        TABLE.get()
+    }
+
+    fn open(bytes: &'static [u8]) -> Result<Self, CompactError> {
+        if bytes.len() < HEADER_BYTES || !bytes.starts_with(&MAGIC) {
+            let found = quoted(&bytes[..bytes.len().min(MAGIC.len())]);
+            return invalid(0, found, format!("the mark {}", quoted(&MAGIC)));
+        }
         let mut file = ByteReader {
-            bytes: FILE,
-            at: MAGIC_BYTES,
+            bytes,
+            at: MAGIC.len(),
         };
         let [stars, listed] = [(); 2].map(|()| u32::from_le_bytes(file.take()) as usize);
-        Self {
+        let length = HEADER_BYTES as u64 + STAR_BYTES * stars as u64 + HR_BYTES * listed as u64;
+        if bytes.len() as u64 != length {
+            let found = format!("the end of a file of {} bytes", bytes.len());
+            return invalid(bytes.len(), found, format!("{length} bytes"));
+        }
+        Ok(Self {
             skymap: file.column(stars),
             hd: file.column(stars),
             sao: file.column(stars),
             hip: file.column(stars),
             hr_row: file.column(listed),
             hr: file.column(listed),
-        }
+        })
     }
 
     fn row_of_skymap(&self, skymap: u32) -> Option<usize> {
@@ -98,9 +123,24 @@ pub struct StarNumbers {
 }
 
 impl StarNumbers {
+    /// Gives the table of numbers, for programs without the feature `built-in-catalog`. It is kept to
+    /// the end; only the first one that is given counts.
+    ///
+    /// # Errors
+    /// [`CompactError`] if it is not such a table.
+    #[doc(hidden)]
+    pub fn give_table(bytes: Vec<u8>) -> Result<(), CompactError> {
+        if TABLE.get().is_none() {
+            let _ = TABLE.set(Numbers::open(bytes.leak())?);
+        }
+        Ok(())
+    }
+
     /// The numbers of the star with a Skymap or Hipparcos number; none of any other star.
     pub(super) fn of(id: StarId) -> Self {
-        let numbers = Numbers::open();
+        let Some(numbers) = Numbers::table() else {
+            return Self::default();
+        };
         let row = match id {
             StarId::Skymap(skymap) => numbers.row_of_skymap(skymap),
             StarId::Hipparcos(hipparcos) => numbers.row_of_hipparcos(hipparcos),
@@ -157,11 +197,17 @@ mod tests {
         let stars = Catalog::built_in().stars().iter();
         let mut skymap: Vec<u32> = stars.map(|star| star.id.to_raw().1 as u32).collect();
         skymap.sort_unstable();
-        let numbers = Numbers::open();
+        let numbers = Numbers::table().unwrap();
         let listed: Vec<u32> = numbers.skymap.iter().filter_map(number).collect();
         assert_eq!(skymap, listed);
-        let bytes = 13 * numbers.skymap.len() + 6 * numbers.hr.len();
-        assert_eq!(FILE.len(), MAGIC_BYTES + 8 + bytes);
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        let refused = |bytes| Numbers::open(bytes).err().unwrap().to_string();
+        assert!(refused(b"no table").contains("the mark"));
+        assert!(refused(b"").contains("the mark"));
+        assert!(refused(&BUILT_IN[..BUILT_IN.len() - 1]).contains("the end of a file"));
     }
 
     #[test]

@@ -7,7 +7,6 @@ use super::{
 };
 use crate::base::files;
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// A star catalogue: stars, brightest first, and their names.
 ///
@@ -30,9 +29,11 @@ pub struct Catalog {
 }
 
 impl Catalog {
-    /// SKY2000 version 5 revision 4, embedded in the program; decoded at the first call.
+    /// SKY2000 version 5 revision 4, embedded in the program; decoded at the first call. Needs the
+    /// feature `built-in-catalog`.
+    #[cfg(any(feature = "built-in-catalog", test))]
     pub fn built_in() -> &'static Self {
-        static BUILT_IN: OnceLock<Catalog> = OnceLock::new();
+        static BUILT_IN: std::sync::OnceLock<Catalog> = std::sync::OnceLock::new();
         BUILT_IN.get_or_init(|| {
             Self::from_compact(include_bytes!("../../../catalogs/sky2000.bin"))
                 .expect("tests/it/catalog.rs checks the embedded catalogue")

@@ -43,7 +43,7 @@ mod reader;
 pub(super) use decode::decode;
 pub(super) use encode::encode;
 pub(super) use layout::{MAGIC, checksum_of};
-pub(super) use reader::ByteReader;
+pub(super) use reader::{ByteReader, invalid};
 
 #[cfg(test)]
 mod tests;

@@ -31,7 +31,7 @@ impl<'a> ByteReader<'a> {
 }
 
 /// An error at `byte`.
-pub(super) fn invalid<T>(
+pub(in crate::sky::catalog) fn invalid<T>(
     byte: usize,
     found: impl Into<String>,
     expected: impl Into<String>,
