@@ -16,7 +16,7 @@ use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
-use crate::photometry::sky_map::{self, Picture, SkyMap};
+use crate::photometry::sky_map::{self, Picture, SkyMap, StatedLimit};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
@@ -88,11 +88,21 @@ impl SolvedFrame<'_> {
             is_flat: has_flat || camera.is_some(),
         };
         let frame = self.identified_frame(identification);
-        let limit_vmag = comparison.map(|comparison| comparison.limit_vmag);
+        let stated = comparison.map(|comparison| StatedLimit {
+            v_mag: comparison.limit_vmag,
+            extinction_mag: -2.5 * libm::log10(comparison.budget.atmosphere_transmission),
+        });
         let usual = self.context.held.as_ref();
         let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
-        let measured =
-            |usual| sky_map::measure(&frame, &picture, self.context.indexed, limit_vmag, usual);
+        let measured = |usual| {
+            sky_map::measure(
+                &frame,
+                &picture,
+                self.context.indexed,
+                stated.as_ref(),
+                usual,
+            )
+        };
         // Stars that were paired by their places alone tell no zero point.
         let own = held.is_none().then(|| measured(None)).flatten();
         self.sky = own.or_else(|| measured(Some(usual?)));

@@ -15,12 +15,22 @@ pub(super) struct CellLimits {
     pub measured_vmag: Option<Estimate>,
 }
 
-/// The limits of each cell. `stated_vmag` is the limit of the whole frame by the camera's description.
+/// The limit of a whole frame by the camera's description.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub struct StatedLimit {
+    /// V magnitude.
+    pub v_mag: f64,
+    /// What the air that it is stated for takes from light of the frame's centre, in magnitudes.
+    pub extinction_mag: f64,
+}
+
+/// The limits of each cell.
 pub(super) fn limits(
     sky: &Sky,
     witnesses: &[Witness],
     clouds: &[CellClouds],
-    stated_vmag: Option<f64>,
+    stated: Option<&StatedLimit>,
 ) -> Vec<CellLimits> {
     /// Stars of a limit.
     const MIN_STARS: usize = 20;
@@ -35,9 +45,9 @@ pub(super) fn limits(
         .map(|witness| counted(witness, witness.relative_mag))
         .collect();
     let own = completeness::measure(&relative, sky.chance).limit.ok();
-    let by_model = stated_vmag
+    let by_model = stated
         .zip(sky.typical_depth_vmag())
-        .map(|(limit, typical)| limit - typical);
+        .map(|(stated, typical)| sky.in_its_air_vmag(stated) - typical);
     let over_depth = by_model.or(own.map(|own| own.v_mag));
     let of_cell = |cell: usize| {
         let Some(depth_vmag) = sky.depths[cell] else {

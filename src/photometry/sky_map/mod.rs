@@ -36,6 +36,8 @@ pub use grid::Place;
 #[doc(hidden)]
 pub use grid::horizon_places;
 #[doc(hidden)]
+pub use limits::StatedLimit;
+#[doc(hidden)]
 pub use picture::Picture;
 
 use super::IdentifiedFrame;
@@ -93,7 +95,7 @@ pub fn measure(
     frame: &IdentifiedFrame,
     picture: &Picture,
     catalog: &IndexedCatalog,
-    expected_limit_vmag: Option<f64>,
+    stated: Option<&StatedLimit>,
     usual: Option<&ClearSky>,
 ) -> Option<SkyMap> {
     let view = SkyView {
@@ -124,7 +126,7 @@ pub fn measure(
     };
     let witnesses = sky.witnesses();
     let clouds = sky.clouds(&witnesses);
-    let limits = limits::limits(&sky, &witnesses, &clouds, expected_limit_vmag);
+    let limits = limits::limits(&sky, &witnesses, &clouds, stated);
     let no_brightness = brightness::refusal(picture, &clear_sky);
     let light = |cell: usize| match no_brightness {
         None => levels.light(cell, &clear_sky),

@@ -2,6 +2,7 @@
 
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
+use super::limits::StatedLimit;
 use super::stars::SkyStar;
 use crate::detect::Detections;
 use crate::photometry::instrumental_mag;
@@ -44,10 +45,21 @@ impl Sky<'_> {
     /// limit of the whole frame is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
         let limit_adu = self.detections.flux_limits.median()?;
-        let center = self.grid.direction_of(&self.grid.camera().centre());
-        let airmass = center.and_then(|center| self.places.airmass(&center));
         let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
-        Some(self.clear_sky.v_mag(airmass, 0.0, limit_mag))
+        Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
+    }
+
+    /// A limit in the air of the frame, as its stars show it.
+    pub(super) fn in_its_air_vmag(&self, stated: &StatedLimit) -> f64 {
+        self.center_airmass().map_or(stated.v_mag, |airmass| {
+            let extinction_mag = self.clear_sky.extinction_mag.value * airmass;
+            stated.v_mag + stated.extinction_mag - extinction_mag
+        })
+    }
+
+    fn center_airmass(&self) -> Option<f64> {
+        let center = self.grid.direction_of(&self.grid.camera().centre())?;
+        self.places.airmass(&center)
     }
 
     /// The stars in cells whose depth is known.
