@@ -231,6 +231,40 @@ class Night:
         return next(n for n in range(self.frames) if self.hour(n) >= hour)
 
 
+def read_skyglow(path):
+    """Dates and brightnesses of a file in the skyglow community's text format, read by its definition alone."""
+    text = path.read_bytes().decode("ascii")
+    assert "\t" not in text and text.count("\n") == text.count("\r\n") and text.endswith("\r\n")
+    lines = text.split("\r\n")[:-1]
+    assert all(lines), "a blank line"
+    header = [line for line in lines if line.startswith("# ")]
+    assert all(len(line) <= 150 for line in header) and lines[: len(header)] == header
+    known = dict(line[2:].split(": ", 1) for line in header if ": " in line)
+    assert int(known["Number of header lines"]) == len(header) and header[-1] == "# END OF HEADER"
+    names, units = header[-3][2:].split(", "), header[-2][2:].split(";")
+    assert len(names) == len(units) == int(known["Number of fields per line"])
+    at, unit_of_time = names.index("MSAS"), "YYYY-MM-DDTHH:mm:ss.fff"
+    assert units[:2] == [unit_of_time, unit_of_time] and units[at] == "mag/arcsec^2"
+    lat_deg, lon_deg, _ = (float(part) for part in known["Position (lat, lon, elev(m))"].split(", "))
+    assert (lat_deg, lon_deg) == (LAT_DEG, LON_DEG)
+    rows = [line.split(";") for line in lines[len(header) :]]
+    assert all(len(row) == len(names) for row in rows)
+    return [(datetime.datetime.strptime(row[0], "%Y-%m-%dT%H:%M:%S.%f"), float(row[at])) for row in rows]
+
+
+def check_skyglow(directory):
+    """Whether night.dat has the dates and brightnesses of night.jsonl."""
+    rows = [json.loads(line) for line in (directory / "night.jsonl").read_text().splitlines()]
+    wanted = [(row["date"], row["zenith_mag_arcsec2"]) for row in rows if row["date"] and row["zenith_mag_arcsec2"] is not None]
+    read = read_skyglow(directory / "night.dat")
+    same = len(read) == len(wanted)
+    for (date, mag), (iso, known) in zip(read, wanted, strict=False):
+        off = date - datetime.datetime.fromisoformat(iso).replace(tzinfo=None)
+        same &= abs(off.total_seconds()) < 0.001 and abs(mag - known) < 0.00501
+    print(f"night.dat: {len(read)} lines, {'as' if same else 'other than'} in night.jsonl")
+    return same
+
+
 def compared(night, found):
     """Lines of what should be found, and what is; whether all is."""
     clouded = [n for n in range(night.frames) if night.covered(n) > CLOUDED]
@@ -282,6 +316,7 @@ def main():
             print(key, found[key])
         for moment in found["moments"]:
             print(moment["date"], moment["kind"], moment["azimuth_deg"], moment["angle_deg"])
+        is_good &= check_skyglow(directory / "night")
         sys.exit(0 if is_good else 1)
 
 
