@@ -25,6 +25,16 @@ pub struct StatedLimit {
     pub extinction_mag: f64,
 }
 
+impl StatedLimit {
+    /// V magnitude of the limit in the air of a frame, as its stars show it.
+    fn in_air_of(&self, sky: &Sky) -> f64 {
+        sky.center_airmass().map_or(self.v_mag, |airmass| {
+            let extinction_mag = sky.clear_sky.extinction_mag.value * airmass;
+            self.v_mag + self.extinction_mag - extinction_mag
+        })
+    }
+}
+
 /// The limits of each cell.
 pub(super) fn limits(
     sky: &Sky,
@@ -47,7 +57,7 @@ pub(super) fn limits(
     let own = completeness::measure(&relative, sky.chance).limit.ok();
     let by_model = stated
         .zip(sky.typical_depth_vmag())
-        .map(|(stated, typical)| sky.in_its_air_vmag(stated) - typical);
+        .map(|(stated, typical)| stated.in_air_of(sky) - typical);
     let over_depth = by_model.or(own.map(|own| own.v_mag));
     let of_cell = |cell: usize| {
         let Some(depth_vmag) = sky.depths[cell] else {

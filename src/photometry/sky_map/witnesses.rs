@@ -2,7 +2,6 @@
 
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
-use super::limits::StatedLimit;
 use super::stars::SkyStar;
 use crate::detect::Detections;
 use crate::photometry::instrumental_mag;
@@ -49,15 +48,8 @@ impl Sky<'_> {
         Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
     }
 
-    /// A limit in the air of the frame, as its stars show it.
-    pub(super) fn in_its_air_vmag(&self, stated: &StatedLimit) -> f64 {
-        self.center_airmass().map_or(stated.v_mag, |airmass| {
-            let extinction_mag = self.clear_sky.extinction_mag.value * airmass;
-            stated.v_mag + stated.extinction_mag - extinction_mag
-        })
-    }
-
-    fn center_airmass(&self) -> Option<f64> {
+    /// Airmass of the frame's centre, where the horizon is known.
+    pub(super) fn center_airmass(&self) -> Option<f64> {
         let center = self.grid.direction_of(&self.grid.camera().centre())?;
         self.places.airmass(&center)
     }
