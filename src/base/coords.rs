@@ -226,6 +226,12 @@ impl<A, B> Rotation<A, B> {
     }
 }
 
+/// The rotation vector of a matrix that turns by a small angle, in radians: to second order in the angle.
+pub(crate) fn small_turn_rad(matrix: &Matrix3<f64>) -> Vector3<f64> {
+    let half = (matrix - matrix.transpose()) * 0.5;
+    Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)])
+}
+
 impl Rotation<Icrs, Camera> {
     /// The attitude of a camera with this boresight, whose image-up (−y) has the position angle
     /// `up_pa_rad`, from north through east.

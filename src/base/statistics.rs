@@ -3,6 +3,9 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
 
+/// Full width at half maximum of a Gaussian, in standard deviations.
+pub(crate) const GAUSSIAN_FWHM: f64 = 2.354_820_045_030_949;
+
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {

@@ -6,14 +6,12 @@ use super::digits::{
 use super::frame_report::TrailReport;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::format::{finite, to_decimals, to_significant, turn_deg};
+use crate::base::statistics::GAUSSIAN_FWHM;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::detect::Trail;
 use crate::photometry::instrumental_mag;
 use crate::pipeline::Solution;
 use crate::sky::observer::Observation;
-
-/// Full width at half maximum of a Gaussian, over its standard deviation.
-const FWHM_PER_SIGMA: f64 = 2.354_820_045;
 
 /// The trails of a frame, where they were searched.
 pub(super) fn reports(solution: &Solution) -> Option<Vec<TrailReport>> {
@@ -43,7 +41,7 @@ fn report(solution: &Solution, trail: &Trail) -> TrailReport {
         y_end: to_decimals(trail.end.y, PIXEL_DECIMALS),
         sigma_across_px: to_significant(trail.across_sigma_px, SIGMA_DIGITS),
         length_px: to_decimals(trail.length_px(), PIXEL_DECIMALS),
-        width_px: to_significant(FWHM_PER_SIGMA * trail.width_sigma_px, SIGMA_DIGITS),
+        width_px: to_significant(GAUSSIAN_FWHM * trail.width_sigma_px, SIGMA_DIGITS),
         flux: to_significant(trail.flux_adu(), FLUX_DIGITS),
         flux_per_px: to_significant(trail.flux_per_px_adu, FLUX_DIGITS),
         snr: to_significant(trail.snr, FLUX_DIGITS),

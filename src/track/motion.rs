@@ -11,7 +11,7 @@
 //! Navigation, section 6.2.2 (white acceleration) and 11.6 (noise from innovations).
 
 use super::outcome::{AngularRate, Attitude};
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, small_turn_rad};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// Covariance of the small rotation and of the rate.
@@ -200,12 +200,7 @@ pub(super) fn turn_between(
 ) -> Vector3<f64> {
     let m = to.matrix() * from.matrix().transpose();
     // sin θ times the axis: exact for small angles, where the cosine is not.
-    let skew = 0.5
-        * Vector3::new(
-            m[(2, 1)] - m[(1, 2)],
-            m[(0, 2)] - m[(2, 0)],
-            m[(1, 0)] - m[(0, 1)],
-        );
+    let skew = small_turn_rad(&m);
     let sine = skew.norm();
     let angle = libm::atan2(sine, 0.5 * (m.trace() - 1.0));
     if sine > 0.0 {

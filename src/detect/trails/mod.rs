@@ -9,16 +9,17 @@
 //!    large.
 //! 3. `band`: the pixels along a line: a Gaussian ridge is fitted to them, and the ends are where the
 //!    ridge has half of its height.
-//! 4. What is no trail is left out: what is narrower than a star or broader than three, along a row or a column, dark on
-//!    one side only, and the spikes of saturated stars.
+//! 4. What is no trail is left out: what is narrower than a star or broader than three, along a row or a
+//!    column, dark on one side only, and the spikes of saturated stars.
 //!
 //! The Hough transform counts the pixels above a threshold along lines of whole degrees; sums of the
 //! pixels themselves show fainter lines, and cost no more.
 //!
-//! Caveats: trails along a row or a column to within a pixel are taken for noise of the detector; curved trails are found in pieces, or not at all. A trail through the centre of a saturated
-//! star that is near the trail's middle or one of its ends is taken for a spike. Trails shorter than 16
-//! cells are detections with the flag `trail` only. Of two that are closer than some 10 cells side by side, one may be lost. Frames
-//! whose stars are trails are not searched.
+//! Caveats: trails along a row or a column to within a pixel are taken for noise of the detector; curved
+//! trails are found in pieces, or not at all. A trail through the centre of a saturated star that is near
+//! the trail's middle or one of its ends is taken for a spike. Trails shorter than 16 cells are detections
+//! with the flag `trail` only. Of two that are closer than some 10 cells side by side, one may be lost.
+//! Frames whose stars are trails are not searched.
 //!
 //! # Reference
 //! Nir, Zackay & Ofek 2018, AJ 156, 229, section 2 (streaks by the fast Radon transform); Götz &

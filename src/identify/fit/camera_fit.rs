@@ -4,9 +4,9 @@
 //! attitude, covariance
 
 use super::adjustment::{Adjustment, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px};
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, small_turn_rad};
 use crate::camera::{CameraModel, Distortion, DistortionModel, KnownLens};
-use nalgebra::{Matrix4, SMatrix, Vector4};
+use nalgebra::{Matrix4, SMatrix};
 
 /// Result of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,9 +178,9 @@ fn central_pose_by_parameters<const P: usize>(camera: &CameraModel) -> SMatrix<f
         let moved = with_step(camera, distortion, parameter, step);
         // The lens's axes stay, so the camera's turn the other way.
         let turn = to_lens.tr_mul(&moved.lens_axes());
-        let half = (turn.transpose() - turn) * 0.5;
+        let turn_rad = small_turn_rad(&turn.transpose());
         let ln_ratio = libm::log(moved.central_focal_length_px()) - ln_central;
-        let change = Vector4::new(half[(2, 1)], half[(0, 2)], half[(1, 0)], ln_ratio) / step;
+        let change = turn_rad.push(ln_ratio) / step;
         by_parameters.set_column(parameter, &change);
     }
     by_parameters

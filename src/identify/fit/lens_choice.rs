@@ -3,7 +3,7 @@
 //! Lenses are compared by how well they predict stars that are left out of the fit.
 
 use super::{MeasuredStar, POSE_PARAMETERS, Predictions, fit_camera, predictions_by_terms};
-use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::coords::{Camera, Icrs, Rotation, small_turn_rad};
 use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
 use crate::identify::field::StarField;
 use crate::identify::grid::FrameGrid;
@@ -130,9 +130,8 @@ impl Rival {
     fn change_to(&self, other: &Self) -> Vector4<f64> {
         let (camera, icrs_to_camera) = with_projection(&other.fitted, self.lens.projection);
         let turn = icrs_to_camera.matrix() * self.fitted.icrs_to_camera.matrix().transpose();
-        let half = (turn - turn.transpose()) * 0.5;
         let scale = camera.central_focal_length_px() / self.fitted.camera.central_focal_length_px();
-        Vector4::new(half[(2, 1)], half[(0, 2)], half[(1, 0)], libm::log(scale))
+        small_turn_rad(&turn).push(libm::log(scale))
     }
 }
 

@@ -1,13 +1,12 @@
 //! Spots that are a function of the distance only, integrated over pixels: Moffat's and Airy's.
 
+use crate::base::statistics::GAUSSIAN_FWHM;
 use crate::camera::data_sheet::{Imperfections, SpotForm};
 use std::f64::consts::PI;
 
 /// Radius of these spots, in standard deviations of a Gaussian as wide: 0.06 % of the light of
 /// Moffat's with an exponent of 2.5 lies beyond, and 2 % of Airy's.
 pub(super) const PROFILE_SIGMAS: f64 = 25.0;
-/// Full width at half maximum of a Gaussian, in standard deviations.
-const GAUSSIAN_FWHM: f64 = 2.354_820_045_030_949;
 
 /// The density of the light of a star over the distance.
 #[derive(Debug, Clone)]

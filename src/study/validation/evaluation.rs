@@ -3,6 +3,7 @@
 use super::light::LightMap;
 use super::record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
 use super::validator::{SimulatedFrame, Validator};
+use crate::base::coords::small_turn_rad;
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::{Identification, SourceIndex};
@@ -13,7 +14,6 @@ use crate::photometry::{SUN_BV_MAG, filter_response};
 use crate::pipeline::{Note, Outcome, Solution, Source};
 use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
-use nalgebra::Vector3;
 use std::collections::{HashMap, HashSet};
 
 pub(super) struct Evaluation<'a> {
@@ -368,8 +368,7 @@ impl<'a> Evaluation<'a> {
         let found = self.found.filter(|_| self.answer() == Answer::Right)?;
         let truth = &self.simulated.pointing.icrs_to_camera;
         let turn = found.icrs_to_camera.matrix() * truth.matrix().transpose();
-        let half = (turn - turn.transpose()) * 0.5;
-        let error_rad = Vector3::new(half[(2, 1)], half[(0, 2)], half[(1, 0)]);
+        let error_rad = small_turn_rad(&turn);
         let factor = found.attitude_covariance_rad2.cholesky();
         let nees = factor.map(|factor| error_rad.dot(&factor.solve(&error_rad)));
         let error_arcsec = error_rad * ARCSEC_PER_RAD;
