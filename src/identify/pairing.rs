@@ -22,10 +22,20 @@ pub struct Pair {
     pub v_mag: f32,
     /// Direction of its light, at the date of the frame.
     pub direction: UnitVector<Icrs>,
+    /// Standard error of the place of its light on each axis, in pixels: 0 for a single star.
+    pub light_sigma_px: f64,
     /// Distance between the observed and the predicted position, in pixels.
     pub residual_px: f64,
     /// Probability that the pair is chance; 1 as long as it was not computed.
     pub p_chance: f64,
+}
+
+impl Pair {
+    /// Standard error of the distance of `star`, the observed one, from the place of its light, on each axis,
+    /// in pixels.
+    pub fn sigma_px(&self, star: &ObservedStar) -> f64 {
+        libm::hypot(star.sigma_px, self.light_sigma_px)
+    }
 }
 
 /// Pairs observed and predicted stars. Its buffers are reused.
@@ -81,6 +91,7 @@ impl Pairing {
                 star: found.star,
                 v_mag: found.v_mag,
                 direction: found.direction,
+                light_sigma_px: 0.0,
                 residual_px: found.pixel.distance_to(&star.position),
                 p_chance: 1.0,
             })

@@ -10,6 +10,7 @@ use crate::camera::{
     CameraModel, Distortion, DistortionModel, LENS_TERMS, MAX_TERMS, MONOMIALS, Observed, monomials,
 };
 use crate::identify::field::ObservedStar;
+use crate::identify::pairing::Pair;
 use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector, Vector3};
 
@@ -25,14 +26,14 @@ pub struct MeasuredStar {
 }
 
 impl MeasuredStar {
-    /// An observed star with its direction; all measure worse by `excess_px` than stated.
-    pub fn of(star: &ObservedStar, icrs: UnitVector<Icrs>, excess_px: f64) -> Self {
+    /// The observed star of a pair; all measure worse by `excess_px` than stated.
+    pub fn of(star: &ObservedStar, pair: &Pair, excess_px: f64) -> Self {
         /// Errors of lists that state none.
         const LEAST_PX: f64 = 1e-3;
         Self {
             pixel: star.position,
-            icrs,
-            sigma_px: libm::hypot(star.sigma_px, excess_px).max(LEAST_PX),
+            icrs: pair.direction,
+            sigma_px: libm::hypot(pair.sigma_px(star), excess_px).max(LEAST_PX),
         }
     }
 }

@@ -403,7 +403,7 @@ impl Refiner {
     fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
             let star = &problem.field.stars[pair.observed];
-            let mut measured = MeasuredStar::of(star, pair.direction, excess_px);
+            let mut measured = MeasuredStar::of(star, pair, excess_px);
             measured.sigma_px = robust_sigma_px(measured.sigma_px, pair.residual_px);
             measured
         };
@@ -481,7 +481,8 @@ impl Refiner {
     /// counts: the faintest were detected because noise made them brighter, and it moved them, too.
     fn excess_sigma_of(&mut self, problem: Problem, parameters: usize) -> f64 {
         let expected_sq = RAYLEIGH_MEDIAN.powi(2) * self.free_share(parameters);
-        let stated_sq = |pair: &Pair| problem.field.stars[pair.observed].sigma_px.powi(2);
+        let stars = &problem.field.stars;
+        let stated_sq = |pair: &Pair| pair.sigma_px(&stars[pair.observed]).powi(2);
         let worst_sq = self.scratch.median(self.pairs.iter().map(stated_sq));
         let residuals = self.residuals_px.iter().zip(&self.pairs);
         let squares = &mut self.scratch.squares;

@@ -47,6 +47,9 @@ const AS_MUCH: f64 = 1.05;
 const MAX_RIVALS: f64 = 1e12;
 /// The variance that a pixel's own width adds to a spot, in px².
 const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
+/// Standard deviation of the logarithm of the ratio of two stars' light, over that of their V magnitudes:
+/// 0.3 mag, by the colors of the stars and the band of the camera.
+const LN_RATIO_SIGMA: f64 = 0.28;
 /// Lights closer than this, in standard deviations of the spot, are the same.
 const SAME_LIGHT_SIGMAS: f64 = 0.25;
 /// The mean shift ends at steps below this, in pixels, …
@@ -94,6 +97,8 @@ struct Seen {
 #[derive(Debug, Clone, Copy)]
 struct Blend {
     pixel: PixelPoint,
+    /// Standard error of that place on each axis, in pixels.
+    sigma_px: f64,
     /// V magnitude of all of it that a spot at its place takes up.
     v_mag: f64,
     /// Light that a spot at the detection takes up of the other stars, over that of the star itself.
@@ -184,6 +189,8 @@ impl Blends {
                 } else {
                     candidate.distance_px = distance_px;
                     candidate.light = blend.pixel;
+                    candidate.light_sigma_px = blend.sigma_px;
+                    candidate.sigma_px = libm::hypot(candidate.sigma_px, blend.sigma_px);
                     candidate.direction = view
                         .direction_of(&blend.pixel)
                         .unwrap_or(candidate.direction);
@@ -235,8 +242,12 @@ impl Blends {
             .iter()
             .map(|(place, light)| light * weight_at(&pixel, place, view.variance_px2))
             .sum();
+        // How far the place moves with the light of the others, to first order.
+        let by_ln_ratio_px =
+            pixel.distance_to(&own.0) * weight_at(&pixel, &own.0, view.variance_px2) / sum;
         Some(Blend {
             pixel,
+            sigma_px: LN_RATIO_SIGMA * by_ln_ratio_px,
             v_mag: f64::from(star.v_mag) - 2.5 * libm::log10(sum),
             others: others.min(MAX_RIVALS),
         })
@@ -348,6 +359,7 @@ mod tests {
             own_v_mag,
             blend: Some(Blend {
                 pixel: PixelPoint::new(light_x, 0.0),
+                sigma_px: 0.0,
                 v_mag: 5.0,
                 others: 0.0,
             }),

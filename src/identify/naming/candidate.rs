@@ -22,6 +22,8 @@ pub struct Candidate {
     pub light: PixelPoint,
     /// Direction of its light: its own, or that of the blend.
     pub direction: UnitVector<Icrs>,
+    /// Standard error of the place of its light on each axis, in pixels: 0 for a single star.
+    pub light_sigma_px: f64,
     /// Distance between the observed position and that of the light, in pixels.
     pub distance_px: f64,
     /// Standard error of that distance on each axis, in pixels.
@@ -47,6 +49,7 @@ impl Candidate {
             v_mag: f64::from(predicted.v_mag),
             light: predicted.pixel,
             direction: predicted.direction,
+            light_sigma_px: 0.0,
             distance_px: near.distance_px,
             sigma_px,
             gate_px,
@@ -63,6 +66,7 @@ impl Candidate {
             star: self.star,
             v_mag: self.own_v_mag,
             direction: self.direction,
+            light_sigma_px: self.light_sigma_px,
             residual_px: self.distance_px,
             p_chance: self.p_chance,
         }

@@ -18,7 +18,9 @@ use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
 use crate::identify::effort::Effort;
 use crate::identify::field::{ObservedStar, StarField};
-use crate::identify::fit::{Growth, MeasuredStar, POSE_PARAMETERS, Refined, Refiner, Seed, Start};
+use crate::identify::fit::{
+    Growth, MeasuredStar, POSE_PARAMETERS, Refined, Refiner, Seed, Start, WIDE_RAD,
+};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
 use crate::identify::priors::{Priors, SkyRegion};
@@ -177,7 +179,7 @@ impl<'a> Search<'a> {
         seed.clear();
         seed.extend(refiner.pairs.iter().map(|pair| {
             let star = &window.field.stars[pair.observed];
-            let measured = MeasuredStar::of(star, pair.direction, refined.excess_sigma_px);
+            let measured = MeasuredStar::of(star, pair, refined.excess_sigma_px);
             MeasuredStar {
                 pixel: window.in_frame(&star.position),
                 ..measured
@@ -218,7 +220,9 @@ impl<'a> Search<'a> {
             direction.is_none_or(|seen| seen.angle_to(&UnitVector::BORESIGHT) > outermost_rad)
         };
         let beyond = stars.iter().filter(is_beyond).count();
-        if camera.is_pinhole() || (beyond as f64) < LEAST_BEYOND * refiner.pairs.len() as f64 {
+        if camera.radius_rad() < WIDE_RAD
+            || (beyond as f64) < LEAST_BEYOND * refiner.pairs.len() as f64
+        {
             return None;
         }
         seed.clear();
@@ -226,7 +230,7 @@ impl<'a> Search<'a> {
         let of_middle = of_middle.filter(|pair| angle_rad(pair) < MIDDLE * outermost_rad);
         let measured = |pair: &Pair| {
             let star = &stars[pair.observed];
-            MeasuredStar::of(star, pair.direction, answer.excess_sigma_px)
+            MeasuredStar::of(star, pair, answer.excess_sigma_px)
         };
         seed.extend(of_middle.map(measured));
         growth.grow(problem, &Seed::of_middle(&hypothesis, seed))

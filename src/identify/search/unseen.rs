@@ -128,6 +128,7 @@ mod tests {
                 star: star.star,
                 v_mag: star.v_mag,
                 direction: star.direction,
+                light_sigma_px: 0.0,
                 residual_px: 0.0,
                 p_chance: 0.0,
             });
