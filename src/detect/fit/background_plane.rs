@@ -1,11 +1,12 @@
 //! The background in the window of a fit.
 
+use super::edge::{Edge, RING_PX, Ring, RingPixel};
 use super::window::Window;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{SMatrix, SVector};
 
-/// A plane.
+/// A plane, and where it does not hold.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BackgroundPlane {
     /// Background in the first pixel of the window, in ADU.
@@ -14,6 +15,12 @@ pub(super) struct BackgroundPlane {
     pub across: f32,
     /// Increase from row to row, in ADU.
     pub down: f32,
+    /// An edge beyond which it does not hold.
+    edge: Option<Edge>,
+    /// What the background has more, in ADU: the coefficients of x², xy and y², from the middle of the window.
+    bend: [f64; 3],
+    /// Standard deviation of the pixels around the window about it, in ADU; 0 where they were not looked at.
+    pub scatter_adu: f64,
 }
 
 impl BackgroundPlane {
@@ -38,70 +45,127 @@ impl BackgroundPlane {
             corner,
             across: (background(x0 + window.width, y0) - corner) / window.width.max(1) as f32,
             down: (background(x0, y0 + window.height) - corner) / window.height.max(1) as f32,
+            edge: None,
+            bend: [0.0; 3],
+            scatter_adu: 0.0,
         }
     }
 
-    /// The plane through the pixels in a ring around the window, without stars. `None` where they are
-    /// too few.
-    fn through_ring(self, view: &View<'_>, window: &Window) -> Option<Self> {
-        /// Breadth of the ring, in pixels.
-        const BREADTH_PX: usize = 5;
-        /// Rounds of clipping: the first planes are of the stars, too.
-        const ROUNDS: usize = 6;
-        /// Pixels so many standard deviations off the plane of the round before are not its own.
-        const CLIP_SIGMAS: f64 = 2.5;
-        /// Share of the pixels that is left at least.
-        const MIN_SHARE: f64 = 0.4;
-        let columns = window.x0.saturating_sub(BREADTH_PX)
-            ..(window.x0 + window.width + BREADTH_PX).min(view.width);
-        let rows = window.y0.saturating_sub(BREADTH_PX)
-            ..(window.y0 + window.height + BREADTH_PX).min(view.height);
-        let is_inside = |x: usize, y: usize| {
-            (window.x0..window.x0 + window.width).contains(&x)
-                && (window.y0..window.y0 + window.height).contains(&y)
-        };
-        let ring = || {
-            let all = rows
-                .clone()
-                .flat_map(|y| columns.clone().map(move |x| (x, y)));
-            all.filter(|&(x, y)| !is_inside(x, y))
-        };
-        let offset = |x: usize, y: usize| {
-            let [x, y] = [x as f64 - window.x0 as f64, y as f64 - window.y0 as f64];
-            Vector3::new(1.0, x, y)
-        };
-        let mut plane: Option<(Vector3<f64>, f64)> = None;
-        for _ in 0..ROUNDS {
-            let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-            let (mut squares, mut all) = (0.0, 0.0);
-            for (x, y) in ring() {
-                let (terms, value) = (offset(x, y), f64::from(view.at(x, y) - self.corner));
-                all += 1.0;
-                let is_off = |(plane, sigma): (Vector3<f64>, f64)| {
-                    (value - plane.dot(&terms)).abs() > CLIP_SIGMAS * sigma
-                };
-                if value.is_nan() || plane.is_some_and(is_off) {
-                    continue;
-                }
-                normal += terms * terms.transpose();
-                right += terms * value;
-                squares += value * value;
+    /// What the background has more than the plane, in ADU, at places from the middle of the window: NaN where
+    /// it is not known. `None` where it has nothing more.
+    pub fn rest(&self) -> Option<impl Fn([f64; 2]) -> f64> {
+        let Self { edge, bend, .. } = *self;
+        let has_rest = edge.is_some() || bend != [0.0; 3];
+        has_rest.then_some(move |[x, y]: [f64; 2]| {
+            if edge.is_some_and(|edge| edge.hides([x, y])) {
+                f64::NAN
+            } else {
+                bend[0] * x * x + bend[1] * x * y + bend[2] * y * y
             }
-            let used: f64 = normal[(0, 0)];
-            if used < (MIN_SHARE * all).max(4.0) {
-                return None;
-            }
-            let fitted = normal.cholesky()?.solve(&right);
-            let variance = (squares - fitted.dot(&right)) / (used - 3.0);
-            plane = Some((fitted, variance.max(0.0).sqrt()));
-        }
-        let (plane, _) = plane?;
-        Some(Self {
-            corner: self.corner + plane[0] as f32,
-            across: plane[1] as f32,
-            down: plane[2] as f32,
         })
     }
+
+    /// That through the pixels in a ring around the window, without stars, on this side of an edge. `None`
+    /// where they are too few.
+    fn through_ring(self, view: &View<'_>, window: &Window) -> Option<Self> {
+        let mut ring = ring_around(view, window);
+        let edge = Edge::in_ring(&ring);
+        if let Some(edge) = edge {
+            ring.retain(|pixel| !edge.hides(pixel.from_middle.map(f64::from)));
+        }
+        let ([level, across, down, bend @ ..], variance) = surface_through(&ring)?;
+        let [x, y] = window.middle();
+        Some(Self {
+            corner: (level - across * x - down * y) as f32,
+            across: across as f32,
+            down: down as f32,
+            edge,
+            bend,
+            scatter_adu: variance.sqrt(),
+        })
+    }
+}
+
+/// The pixels around a window.
+fn ring_around(view: &View<'_>, window: &Window) -> Ring {
+    let around = |first: usize, count: usize, side: usize| {
+        first.saturating_sub(RING_PX)..(first + count + RING_PX).min(side)
+    };
+    let columns = around(window.x0, window.width, view.width);
+    let rows = around(window.y0, window.height, view.height);
+    let is_inside = |x: usize, y: usize| {
+        (window.x0..window.x0 + window.width).contains(&x)
+            && (window.y0..window.y0 + window.height).contains(&y)
+    };
+    let [middle_x, middle_y] = window.middle();
+    let pixel = |x: usize, y: usize| RingPixel {
+        from_middle: [
+            (x as f64 - window.x0 as f64 - middle_x) as f32,
+            (y as f64 - window.y0 as f64 - middle_y) as f32,
+        ],
+        value: view.at(x, y),
+    };
+    let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let around = all.filter(|&(x, y)| !is_inside(x, y));
+    let pixels = around.map(|(x, y)| pixel(x, y));
+    pixels.filter(|pixel| !pixel.value.is_nan()).collect()
+}
+
+/// The background through pixels without stars: its value in the middle of the window, its increase from column
+/// to column and from row to row, and the coefficients of x², xy and y², which are 0 where a plane is enough;
+/// and their variance about it. `None` where the pixels are too few.
+fn surface_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
+    /// The gain in χ² over a plane that the further terms need.
+    const LEAST_GAIN: f64 = 25.0;
+    let (plane, of_plane) = fitted_surface::<3>(ring)?;
+    if let Some((bent, of_bent)) = fitted_surface::<6>(ring) {
+        let gain = ring.len() as f64 * (of_plane / of_bent - 1.0);
+        if gain > LEAST_GAIN {
+            return Some((bent.into(), of_bent));
+        }
+    }
+    Some(([plane[0], plane[1], plane[2], 0.0, 0.0, 0.0], of_plane))
+}
+
+/// The surface of the first `N` terms through pixels without stars, and their variance about it.
+fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>, f64)> {
+    /// Rounds of clipping: the first surfaces are of the stars, too.
+    const ROUNDS: usize = 6;
+    /// Pixels so many standard deviations off the surface of the round before are not its own.
+    const CLIP_SIGMAS: f64 = 2.5;
+    /// Share of the pixels that is left at least.
+    const MIN_SHARE: f64 = 0.4;
+    let first = f64::from(ring.first()?.value);
+    let mut found: Option<(SVector<f64, N>, f64)> = None;
+    for _ in 0..ROUNDS {
+        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::zeros());
+        let (mut used, mut squares) = (0.0, 0.0);
+        for pixel in ring {
+            let [x, y] = pixel.from_middle.map(f64::from);
+            let all = [1.0, x, y, x * x, x * y, y * y];
+            let terms = SVector::<f64, N>::from_column_slice(&all[..N]);
+            let value = f64::from(pixel.value) - first;
+            let is_off = |(surface, variance): (SVector<f64, N>, f64)| {
+                (value - surface.dot(&terms)).powi(2) > CLIP_SIGMAS * CLIP_SIGMAS * variance
+            };
+            if found.is_some_and(is_off) {
+                continue;
+            }
+            normal += terms * terms.transpose();
+            right += terms * value;
+            squares += value * value;
+            used += 1.0;
+        }
+        if used < (MIN_SHARE * ring.len() as f64).max(N as f64 + 1.0) {
+            return None;
+        }
+        let surface = normal.cholesky()?.solve(&right);
+        let variance = (squares - surface.dot(&right)) / (used - N as f64);
+        found = Some((surface, variance.max(0.0)));
+    }
+    let (mut surface, variance) = found?;
+    surface[0] += first;
+    Some((surface, variance))
 }
 
 #[cfg(test)]

@@ -102,19 +102,18 @@ impl FrameMaps<'_> {
             Some(psf) => psf.at(cx as f64, cy as f64, &mut window.psf),
             None => window.psf.clear(),
         }
-        let noise = self.noise_at(cx as f64, cy as f64);
+        let plane = BackgroundPlane::in_window(&self.view, self.background, window);
+        // Leaves and the like are noise, too.
+        let noise = self.noise_at(cx as f64, cy as f64).max(plane.scatter_adu);
         window.noise_adu = noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
         window.background_noise = MAP_ERROR * noise;
         let halo_error = HALO_ERROR * peak;
         window.background_error = (window.background_noise.powi(2) + halo_error.powi(2)).sqrt();
-        self.fill(window);
-    }
-
-    /// Fills the window with its pixels, less a plane through the background.
-    fn fill(&self, window: &mut Window) {
-        let plane = BackgroundPlane::in_window(&self.view, self.background, window);
         copy_above(&self.view, plane, self.saturation_adu, window);
+        if let Some(rest) = plane.rest() {
+            window.subtract_adu(rest);
+        }
     }
 }
 

@@ -15,6 +15,7 @@
 mod background_plane;
 mod batch;
 mod buffers;
+mod edge;
 mod fitter;
 mod frame_maps;
 mod gauss_newton;

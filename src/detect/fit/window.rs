@@ -53,6 +53,23 @@ impl Window {
         })
     }
 
+    /// Its middle, as a column and a row.
+    pub fn middle(&self) -> [f64; 2] {
+        [self.width, self.height].map(|side| 0.5 * (side as f64 - 1.0))
+    }
+
+    /// Subtracts light in ADU that depends on the place, from the middle; leaves out where it is NaN.
+    pub fn subtract_adu(&mut self, light_adu: impl Fn([f64; 2]) -> f64) {
+        let (groups, [x, y]) = (self.groups(), self.middle());
+        for row in 0..self.height {
+            for column in 0..self.width {
+                let light_adu = light_adu([column as f64 - x, row as f64 - y]);
+                let pixel = &mut self.data[row * groups + column / GROUP_PX][column % GROUP_PX];
+                *pixel -= (light_adu / self.noise_adu) as f32;
+            }
+        }
+    }
+
     /// Becomes a copy of another window, without a new allocation where the pixels fit.
     pub fn copy_from(&mut self, other: &Self) {
         let mut data = std::mem::take(&mut self.data);
