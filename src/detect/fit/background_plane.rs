@@ -30,7 +30,9 @@ impl BackgroundPlane {
         let of_map = Self::of_map(map, window);
         let [x, y] = [window.x0 + window.width / 2, window.y0 + window.height / 2];
         if map.is_bent_at(x as f32, y as f32) {
-            of_map.through_ring(view, window).unwrap_or(of_map)
+            of_map
+                .through_ring(view, window, f64::from(map.at(x as f32, y as f32).1))
+                .unwrap_or(of_map)
         } else {
             of_map
         }
@@ -67,13 +69,16 @@ impl BackgroundPlane {
 
     /// That through the pixels in a ring around the window, without stars, on this side of an edge. `None`
     /// where they are too few.
-    fn through_ring(self, view: &View<'_>, window: &Window) -> Option<Self> {
+    fn through_ring(self, view: &View<'_>, window: &Window, noise_adu: f64) -> Option<Self> {
         let mut ring = ring_around(view, window);
-        let edge = Edge::in_ring(&ring);
+        let edge = Edge::in_ring(&ring, noise_adu);
         if let Some(edge) = edge {
             ring.retain(|pixel| !edge.hides(pixel.from_middle.map(f64::from)));
         }
-        let ([level, across, down, bend @ ..], variance) = surface_through(&ring)?;
+        let ([level, across, down, bend @ ..], variance) = match edge {
+            Some(_) => surface_through(&ring)?,
+            None => plane_through(&ring)?,
+        };
         let [x, y] = window.middle();
         Some(Self {
             corner: (level - across * x - down * y) as f32,
@@ -81,7 +86,7 @@ impl BackgroundPlane {
             down: down as f32,
             edge,
             bend,
-            scatter_adu: variance.sqrt(),
+            scatter_adu: edge.map_or(0.0, |_| variance.sqrt()),
         })
     }
 }
@@ -111,20 +116,21 @@ fn ring_around(view: &View<'_>, window: &Window) -> Ring {
     pixels.filter(|pixel| !pixel.value.is_nan()).collect()
 }
 
-/// The background through pixels without stars: its value in the middle of the window, its increase from column
-/// to column and from row to row, and the coefficients of x², xy and y², which are 0 where a plane is enough;
-/// and their variance about it. `None` where the pixels are too few.
+/// The plane through pixels without stars: its value in the middle of the window, its increase from column to
+/// column and from row to row, and three zeros; and their variance about it. `None` where they are too few.
+fn plane_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
+    let (plane, variance) = fitted_surface::<3>(ring)?;
+    Some(([plane[0], plane[1], plane[2], 0.0, 0.0, 0.0], variance))
+}
+
+/// The same, with the coefficients of x², xy and y² where a plane is not enough.
 fn surface_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
-    /// The gain in χ² over a plane that the further terms need.
+    /// The gain in χ² over a plane that they need.
     const LEAST_GAIN: f64 = 25.0;
-    let (plane, of_plane) = fitted_surface::<3>(ring)?;
-    if let Some((bent, of_bent)) = fitted_surface::<6>(ring) {
-        let gain = ring.len() as f64 * (of_plane / of_bent - 1.0);
-        if gain > LEAST_GAIN {
-            return Some((bent.into(), of_bent));
-        }
-    }
-    Some(([plane[0], plane[1], plane[2], 0.0, 0.0, 0.0], of_plane))
+    let plane = plane_through(ring)?;
+    let bent = fitted_surface::<6>(ring)
+        .filter(|(_, variance)| ring.len() as f64 * (plane.1 / variance - 1.0) > LEAST_GAIN);
+    Some(bent.map_or(plane, |(surface, variance)| (surface.into(), variance)))
 }
 
 /// The surface of the first `N` terms through pixels without stars, and their variance about it.

@@ -3,9 +3,10 @@
 //! pixels around the window → direction in which they get darker or brighter → the place on it that parts
 //! them best
 
+use crate::base::statistics::median;
 use crate::detect::psf::MAX_WINDOW_PX;
 use arrayvec::ArrayVec;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 /// Breadth of the ring of pixels around a window that tells its background, in pixels.
 pub(super) const RING_PX: usize = 5;
@@ -36,11 +37,11 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// The edge that a ring shows, if it does.
-    pub fn in_ring(ring: &[RingPixel]) -> Option<Self> {
+    /// The edge that a ring shows, if it does; with the noise of a pixel.
+    pub fn in_ring(ring: &[RingPixel], noise_adu: f64) -> Option<Self> {
         let limits = Limits::of(ring)?;
         let across = limits.steepest(ring)?;
-        let along_px = Profile::of(ring, across, limits).edge()?;
+        let along_px = Profile::of(ring, across, limits).edge(noise_adu)?;
         Some(Self {
             away: across.map(|part| part * along_px.signum()),
             distance_px: along_px.abs(),
@@ -121,6 +122,14 @@ struct Bin {
     squares: f64,
 }
 
+/// A step in a profile.
+struct Step {
+    /// Its height, in ADU.
+    height: f64,
+    /// Squared distances of the means of the bins from the profile with it.
+    misfit: f64,
+}
+
 impl Profile {
     fn of(ring: &[RingPixel], across: [f64; 2], limits: Limits) -> Self {
         let middle = 0.5 * BINS as f64;
@@ -146,42 +155,63 @@ impl Profile {
 
     /// Where a step parts the pixels better than a slope does; `None` where it does not, or is so near the
     /// middle that a star there cannot be told from it.
-    fn edge(&self) -> Option<f64> {
+    fn edge(&self, noise_adu: f64) -> Option<f64> {
         const LEAST_DISTANCE_PX: f64 = 2.0;
         /// The gain in χ² that a step needs.
         const LEAST_GAIN: f64 = 25.0;
-        let of_slope = self.misfit(None)?;
+        /// The height that it needs, in noises of a pixel: lower ones move no stars.
+        const LEAST_NOISES: f64 = 3.0;
+        /// The same in standard deviations of pixels next to each other: the rest is faint stars.
+        const LEAST_SIGMAS: f64 = 2.0;
+        let of_slope = self.without_step()?;
         let places = self.bins.iter().map(|bin| bin.place - 0.5);
         let places = places.filter(|place| place.abs() >= LEAST_DISTANCE_PX);
-        let steps = places.filter_map(|place| Some((place, self.misfit(Some(place))?)));
-        let (place, misfit) = steps.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        (of_slope - misfit > LEAST_GAIN * self.variance()).then_some(place)
+        let steps = places.filter_map(|place| Some((place, self.with_step(place)?)));
+        let (place, step) = steps.min_by(|a, b| a.1.misfit.total_cmp(&b.1.misfit))?;
+        let variance = self.variance();
+        let is_clear = of_slope - step.misfit > LEAST_GAIN * variance;
+        let least_height = (LEAST_NOISES * noise_adu).max(LEAST_SIGMAS * variance.sqrt());
+        let is_high = step.height.abs() > least_height;
+        (is_clear && is_high).then_some(place)
     }
 
-    /// That of the pixels of a bin.
+    /// That of the pixels of a bin: the median, as an edge runs through some.
     fn variance(&self) -> f64 {
-        let (mut free, mut squares) = (0.0, 0.0);
-        for bin in &self.bins {
-            free += bin.count - 1.0;
-            squares += bin.squares - bin.sum * bin.sum / bin.count;
-        }
-        squares / free.max(1.0)
+        let of_bins = self.bins.iter().filter(|bin| bin.count > 1.0);
+        let of_bins =
+            of_bins.map(|bin| (bin.squares - bin.sum * bin.sum / bin.count) / (bin.count - 1.0));
+        median(&mut of_bins.collect::<ArrayVec<f64, BINS>>())
     }
 
-    /// Squared distances of the means from a line, with a step where it is stated. `None` where there is
-    /// nothing on one side of it.
-    fn misfit(&self, step: Option<f64>) -> Option<f64> {
-        let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    /// Squared distances of the means of the bins from a line.
+    fn without_step(&self) -> Option<f64> {
+        let fitted = self.fitted(|place| Vector2::new(1.0, place));
+        fitted.map(|(_, misfit)| misfit)
+    }
+
+    /// A step at a place, above a line. `None` where there is nothing on one side of it.
+    fn with_step(&self, at: f64) -> Option<Step> {
+        let fitted = self.fitted(|place| Vector3::new(1.0, place, f64::from(u8::from(place > at))));
+        fitted.map(|(terms, misfit)| Step {
+            height: terms[2],
+            misfit,
+        })
+    }
+
+    /// The coefficients of terms, and squared distances of the means of the bins from their sum.
+    fn fitted<const N: usize>(
+        &self,
+        terms: impl Fn(f64) -> SVector<f64, N>,
+    ) -> Option<(SVector<f64, N>, f64)> {
+        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::zeros());
+        let mut squares = 0.0;
         for bin in &self.bins {
-            let is_behind = step.is_some_and(|step| bin.place > step);
-            let terms = Vector3::new(1.0, bin.place, f64::from(u8::from(is_behind)));
+            let terms = terms(bin.place);
             normal += terms * terms.transpose() * bin.count;
             right += terms * bin.sum;
             squares += bin.sum * bin.sum / bin.count;
         }
-        if step.is_none() {
-            normal[(2, 2)] = 1.0;
-        }
-        Some(squares - right.dot(&normal.cholesky()?.solve(&right)))
+        let found = normal.cholesky()?.solve(&right);
+        Some((found, squares - right.dot(&found)))
     }
 }

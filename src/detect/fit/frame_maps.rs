@@ -84,6 +84,8 @@ impl FrameMaps<'_> {
     pub fn cut_out(&self, points: &[SpotEstimate], radius: usize, window: &mut Window) {
         /// Standard error of the background map over the noise of a pixel.
         const MAP_ERROR: f64 = 0.15;
+        /// Largest scatter of the background that the light of faint stars explains, in noises of a pixel.
+        const USUAL_SCATTER: f64 = 2.0;
         /// Error of the local background over the peak of the star: its halo is not in the map.
         const HALO_ERROR: f64 = 0.01;
         let (columns, rows) = (
@@ -103,8 +105,10 @@ impl FrameMaps<'_> {
             None => window.psf.clear(),
         }
         let plane = BackgroundPlane::in_window(&self.view, self.background, window);
-        // Leaves and the like are noise, too.
-        let noise = self.noise_at(cx as f64, cy as f64).max(plane.scatter_adu);
+        // What is at an edge, leaves and the like, is noise, too.
+        let noise = self.noise_at(cx as f64, cy as f64);
+        let unexplained = (plane.scatter_adu.powi(2) - (USUAL_SCATTER * noise).powi(2)).max(0.0);
+        let noise = (noise.powi(2) + unexplained).sqrt();
         window.noise_adu = noise;
         let peak = points.iter().map(|p| p.flux).fold(0.0, f64::max) * self.matched_gain;
         window.background_noise = MAP_ERROR * noise;
