@@ -113,7 +113,7 @@ fn ring_around(view: &View<'_>, window: &Window) -> Ring {
     let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
     let around = all.filter(|&(x, y)| !is_inside(x, y));
     let pixels = around.map(|(x, y)| pixel(x, y));
-    pixels.filter(|pixel| !pixel.value.is_nan()).collect()
+    pixels.filter(|pixel| pixel.value.is_finite()).collect()
 }
 
 /// The plane through pixels without stars: its value in the middle of the window, its increase from column to
