@@ -15,6 +15,8 @@ const SOLVE_MS = 300_000;
 const FIRST_LOAD_MB = 5;
 // Settings of the camera that are compared with the program's.
 const RANDOM_SETTINGS = 200;
+// The slowest simulated frame of the camera's model: a slow machine may take a multiple of what it should.
+const SLOWEST_MS = 5000;
 const root = path.resolve(import.meta.dirname, "..");
 const dist = path.resolve(option("--dist") ?? path.join(root, "web/dist"));
 const shots = option("--shots");
@@ -326,6 +328,91 @@ async function useOddly() {
   await page.context().close();
 }
 
+/** The simulated frame: its numbers, its pixels, and how long they take. */
+async function useSky(page) {
+  const seen = page.locator("#limit-seen");
+  const shown = async (words) => {
+    await page.waitForFunction((words) => document.querySelector("#limit-seen").textContent.includes(words), words, { timeout: SOLVE_MS });
+    const text = await seen.textContent();
+    const label = await page.locator("#limit-sky").getAttribute("aria-label");
+    const [count, brighter] = [/(\d+) stars? of the catalog/, /(\d+) of them/].map((words) => Number(words.exec(text)?.[1]));
+    check(label.includes(`${count} star`) && label.includes(`${brighter} of them`), `the frame is called ${label}`);
+    return { count, brighter };
+  };
+  /** Sum of grey, how much of it is white, and colored pixels. */
+  const pixels = () => page.evaluate(() => {
+    /** @type {HTMLCanvasElement} */ const canvas = document.querySelector("#limit-sky");
+    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+    let [grey, white, colored] = [0, 0, 0];
+    for (let at = 0; at < data.length; at += 4) {
+      grey += data[at];
+      if (data[at] === 255) white += 1;
+      if (data[at] !== data[at + 2]) colored += 1;
+    }
+    return { mean: (grey / data.length) * 4, white, colored };
+  });
+  // With the whole catalog, whose stars are asked for after the first prediction.
+  const short = await shown("The limit is fainter than the catalog");
+  const before = await pixels();
+  const box = async () => JSON.stringify(await page.locator("#limit-sky").boundingBox());
+  const place = await box();
+  check(before.mean > 30 && before.mean < 90 && before.white > 10 && before.colored === 0, `the frame: ${JSON.stringify(before)}`);
+  await page.locator("#limit-rings").check();
+  check((await pixels()).colored > 100, "stars have no rings");
+  await shot(page, "limit-rings");
+  await page.locator("#limit-rings").uncheck();
+  const limitOf = async (exposure) => {
+    const start = await seen.textContent();
+    await page.locator("#limit-exposure_s").fill(exposure);
+    await page.waitForFunction((start) => document.querySelector("#limit-seen").textContent !== start, start, { timeout: SOLVE_MS });
+    return { ...await shown("limit of V"), ...await pixels() };
+  };
+  const shorter = await limitOf("0.02"), again = await limitOf("0.5");
+  check(await box() === place, "the frame moves when a setting changes");
+  check(shorter.count === short.count && shorter.brighter < short.brighter, `stars above the limit at 0.02 s: ${shorter.brighter} of ${shorter.count}, at 0.5 s: ${short.brighter} of ${short.count}`);
+  check(shorter.white < before.white && again.white === before.white && again.brighter === short.brighter, `white pixels at 0.02 s: ${shorter.white}, at 0.5 s: ${before.white}, then ${again.white}`);
+  await page.locator("#limit-place").selectOption("pleiades");
+  await page.waitForFunction(() => document.querySelector("#limit-sky").getAttribute("aria-label").includes("Pleiades"), null, { timeout: SOLVE_MS });
+  check(page.url().includes("place=pleiades"), "the link does not carry the part of the sky");
+  const size = page.viewportSize();
+  await page.setViewportSize({ width: 320, height: 640 });
+  check(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "the model is wider than 320 px");
+  await page.setViewportSize(size);
+  await page.locator("#limit-place").selectOption("orion");
+  await page.waitForFunction(() => document.querySelector("#limit-sky").getAttribute("aria-label").includes("Orion"), null, { timeout: SOLVE_MS });
+  console.log(`simulated frame: ${short.brighter} of ${short.count} stars above the limit at 0.5 s, ${shorter.brighter} at 0.02 s; ${(await timesOfSky(page)).join(", ")}`);
+}
+
+/** How long frames take: as the preset has it, and the slowest that sliders make. */
+const timesOfSky = async (page) => {
+  const settings = {
+    "imx174-35mm": {}, "nanosat-tracker": {}, "asi183mm-135mm": {}, "a lens of 2 mm": { focal_length_mm: 2 },
+    "a lens of 2 mm, smeared, at 300 s": { focal_length_mm: 2, motion_px: 30, exposure_s: 300 },
+  };
+  const times = await page.evaluate(async (settings) => {
+    // @ts-ignore
+    const { Engine } = await import("./engine.js");
+    const engine = new Engine(() => {});
+    await engine.call("stars");
+    const times = [];
+    for (const [name, values] of settings) {
+      const stated = JSON.stringify({ preset: Object.keys(values).length ? "imx174-35mm" : name, values });
+      // The code is compiled well only after it ran for a while.
+      for (const isFirst of [true, false]) {
+        const start = performance.now();
+        await engine.call("simulate", stated, undefined);
+        if (!isFirst || !times.length) times.push(performance.now() - start);
+      }
+    }
+    engine.stop();
+    return times;
+  }, Object.entries(settings));
+  check(Math.max(...times) < SLOWEST_MS, `a simulated frame takes ${Math.max(...times).toFixed(0)} ms`);
+  return ["the first", ...Object.keys(settings)].map((name, at) => `${name} ${times[at].toFixed(0)} ms`);
+};
+
 /** Random cameras: the page's prediction is the program's. */
 async function useLimits(page) {
   const ranges = {
@@ -374,6 +461,7 @@ async function useModels() {
   await shot(page, "limit-desktop");
   await shotOfPhone(page, "limit-phone-dark");
   await accessible(page, "limit");
+  await useSky(page);
   const before = await page.locator("#limit-answer").textContent();
   await useLimits(page);
   await page.locator("#limit-aperture_mm-range").focus();

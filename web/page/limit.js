@@ -1,6 +1,7 @@
 // The tab of the sensitivity model.
 import { byId, factsOf, pathThrough } from "./dom.js";
 import { Engine } from "./engine.js";
+import { hideSky, setUpSky, showSky } from "./sky.js";
 import { make, makeFigure } from "./views.js";
 
 /**
@@ -25,10 +26,11 @@ const SLIDERS = [
   { names: ["extinction_mag_per_airmass"], title: "Extinction (mag / airmass)", ends: [0, 1], log: false },
   { names: ["motion_px"], title: "Smear during the exposure (px)", ends: [0, 30], log: false },
 ];
-const STEPS = 1000, WAIT_MS = 120, CURVE_POINTS = 31, CURVE_REACH = 8;
+const STEPS = 1000, WAIT_MS = 120, CURVE_WAIT_MS = 300, CURVE_POINTS = 31, CURVE_REACH = 8;
 const engine = new Engine(() => {});
 /** @type {{ name: string, about: string, parameters: { name: string, value: number | null }[] }[]} */ let presets = [];
 /** The values that differ from the preset, by parameter. @type {Record<string, number>} */ let values = {};
+/** The part of the sky that was chosen; without one, that which fits the field. @type {string | undefined} */ let place;
 /** @type {Promise<void> | null} */ let isSetUp = null;
 let areStarsAsked = false;
 
@@ -89,18 +91,20 @@ const fillSliders = () => {
 let timer = 0;
 const changed = () => {
   const settings = new URLSearchParams({ preset: preset(), ...Object.fromEntries(Object.entries(values).map(([k, v]) => [k, String(v)])) });
+  if (place) settings.set("place", place);
   history.replaceState(null, "", `#limit?${settings}`);
   clearTimeout(timer);
   timer = setTimeout(predict, WAIT_MS);
 };
 
-/** The catalog, for the faintest star to be expected: the rest of the model needs none. */
+/** The catalog, for the faintest star to be expected and the frame: the rest of the model needs none. */
 const stars = async () => {
   try {
     await engine.call("stars");
     predict();
-  } catch { /* that one number stays away */ }
+  } catch { /* that one number stays away, and faint stars */ }
 };
+const askForStars = () => { areStarsAsked ||= Boolean(stars()); };
 
 let asked = 0;
 const predict = async () => {
@@ -111,10 +115,14 @@ const predict = async () => {
     const row = JSON.parse(text);
     show(row);
     byId("limit-json").textContent = JSON.stringify(row, null, 1);
+    await drawSky(number);
+    // Not after the curves: those of smeared stars take seconds.
+    askForStars();
     await drawCurves(row, number);
   } catch (error) {
     if (number !== asked) return;
     byId("limit-answer").textContent = error.message;
+    hideSky("There is no frame.");
     byId("limit-facts").replaceChildren();
     byId("limit-figures").replaceChildren();
     byId("limit-budget").tBodies[0].replaceChildren();
@@ -145,7 +153,20 @@ const show = (row) => {
   }
 };
 
+const drawSky = async (number) => {
+  if (number !== asked) return;
+  try {
+    const { about, rgba } = await engine.call("simulate", stated(), place);
+    if (number === asked) showSky(JSON.parse(about), rgba);
+  } catch (error) {
+    if (number === asked) hideSky(error.message);
+  }
+};
+
 const drawCurves = async (row, number) => {
+  // Curves take longer than all else: while sliders move, the frame is not to wait for them.
+  await new Promise((done) => setTimeout(done, CURVE_WAIT_MS));
+  if (number !== asked) return;
   const drawn = [];
   for (const name of ["exposure_s", "aperture_mm"]) {
     const value = row.parameters[name];
@@ -173,7 +194,7 @@ const setUp = async () => {
   for (const { name, about } of presets) byId("limit-preset").appendChild(new Option(`${name}: ${about}`, name));
   makeSliders();
   byId("limit-preset").addEventListener("change", () => { values = {}; fillSliders(); changed(); });
-  byId("limit-reset").addEventListener("click", () => { values = {}; fillSliders(); changed(); });
+  byId("limit-reset").addEventListener("click", () => { values = {}; place = undefined; fillSliders(); changed(); });
   byId("limit-link").addEventListener("click", async () => {
     try {
       await navigator.clipboard.writeText(location.href);
@@ -182,6 +203,7 @@ const setUp = async () => {
       byId("limit-link").textContent = "The address of this page is the link";
     }
   });
+  setUpSky((chosen) => { place = chosen; changed(); });
   byId("limit-form").addEventListener("submit", (event) => event.preventDefault());
 };
 
@@ -195,9 +217,10 @@ export const showLimit = async (settings) => {
   }
   const known = new Set(presets[0].parameters.map((one) => one.name));
   byId("limit-preset").value = presets.some((one) => one.name === settings.get("preset")) ? settings.get("preset") : "imx174-35mm";
+  place = [...byId("limit-place").options].map((one) => one.value).find((one) => one === settings.get("place"));
   values = {};
   for (const [name, text] of settings) if (known.has(name) && text !== "" && Number.isFinite(Number(text))) values[name] = Number(text);
   fillSliders();
   await predict();
-  areStarsAsked ||= Boolean(stars());
+  askForStars();
 };

@@ -140,6 +140,12 @@ const calls = {
     return kind === "overlay" ? solved.overlay(layers) : solved[kind]();
   },
   limit: (stated) => starpipe.limit(stated),
+  simulate: (stated, place) => {
+    const frame = starpipe.simulate(stated, place);
+    const [about, rgba] = [frame.about(), frame.rgba()];
+    frame.free();
+    return { about, rgba };
+  },
   limitCurve: (stated, sweep) => starpipe.limit_curve(stated, sweep),
   parameters: () => starpipe.parameters(),
   defocus: (study) => starpipe.defocus(study),

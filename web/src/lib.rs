@@ -8,6 +8,7 @@ mod defocus;
 mod equipment;
 mod limit;
 mod options;
+mod simulated;
 mod solver;
 mod stated;
 
@@ -15,6 +16,7 @@ pub use catalogs::{index_name, open_catalog, open_numbers};
 pub use defocus::defocus;
 pub use equipment::{Equipment, GivenFile};
 pub use limit::{limit, limit_curve, parameters};
+pub use simulated::{SimulatedFrame, simulate};
 pub use solver::{Solved, Solver, image_count, preview};
 
 use serde::Serialize;
