@@ -66,6 +66,8 @@ async function useFrame(page, shot) {
   if ((await rows.count()) === 0) return;
   await rows.first().click();
   check((await page.locator("#under").textContent()).includes("SNR"), "a row tells nothing");
+  // The view follows in the next picture of the browser, which may be late.
+  for (let waited = 0; waited < SETTLE_MS && (await box()) === whole; waited += 50) await page.waitForTimeout(50);
   check((await box()) !== whole, "a row does not show its star");
 }
 
