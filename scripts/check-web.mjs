@@ -56,9 +56,10 @@ const UNTRUSTED = "starpipe.test";
 
 const browser = await launch(`--host-resolver-rules=MAP ${UNTRUSTED} 127.0.0.1`);
 
-const open = async (viewport, colorScheme, hash = "", address = trusted) => {
+const open = async (viewport, colorScheme, hash = "", address = trusted, prepare = async () => {}) => {
   const context = await browser.newContext({ viewport, colorScheme, acceptDownloads: true });
   const page = await context.newPage();
+  await prepare(page);
   watch(page, (url) => url.startsWith(address) || /^(data|blob):/.test(url));
   await page.addInitScript(() => {
     Object.assign(globalThis, { shift: 0, longTasks: [] });
@@ -148,6 +149,22 @@ async function useTwice() {
   const againMs = await page.evaluate(() => performance.now());
   console.log(`the next visit: catalog and index after ${seconds(againMs)}`);
   check(againMs < figures.readyMs, "the index was not kept");
+  await page.context().close();
+}
+
+/** Where the browser has no room left, the page works all the same. */
+async function useWithoutRoom() {
+  const page = await open({ width: 800, height: 700 }, "light", "", trusted, async (page) => {
+    const session = await page.context().newCDPSession(page);
+    await session.send("Storage.overrideQuotaForOrigin", { origin: new URL(trusted).origin, quotaSize: 1000 });
+  });
+  await ready(page);
+  await page.locator("#files").setInputFiles(frames[0]);
+  await settled(page);
+  check((await page.locator(".say").textContent()).includes("identified"), "no answer without room");
+  await page.waitForFunction(() => document.querySelector("#offline").textContent, null, { timeout: SOLVE_MS });
+  const told = await page.locator("#offline").textContent();
+  check(told.includes("does not keep"), `without room: ${told}`);
   await page.context().close();
 }
 
@@ -499,7 +516,7 @@ async function useOffline() {
 }
 
 try {
-  for (const use of [useTwice, usePhotographs, useEquipment, useOddly, useModels, useOffline, useUntrusted]) await use();
+  for (const use of [useTwice, usePhotographs, useEquipment, useOddly, useModels, useOffline, useWithoutRoom, useUntrusted]) await use();
 } catch (error) {
   check(false, error.stack);
 }

@@ -579,7 +579,7 @@ fn star_match(pair: &Pair, field: &StarField) -> StarMatch {
     }
 }
 
-/// The camera, without the part of the frame where an all-sky lens has shown no stars.
+/// The camera, without the part of the frame where a lens that does not image all of it has shown no stars.
 fn known_part(
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
@@ -590,7 +590,7 @@ fn known_part(
     /// Stars may be this much farther from the axis than the outermost that is named.
     const MARGIN_RAD: f64 = RAD_PER_DEG;
     let corners_rad = camera.radius_rad();
-    if camera.is_pinhole() || corners_rad < WIDE_RAD {
+    if (camera.is_pinhole() && camera.fills_frame()) || corners_rad < WIDE_RAD {
         return *camera;
     }
     let angle_rad = |star: &StarMatch| {

@@ -120,6 +120,40 @@ fn frames_of_the_whole_sky_are_identified_with_nothing_given() {
     }
 }
 
+/// A lens of the sine, a sky of which a pinhole with distortion explains the clear half in the middle.
+#[test]
+fn a_lens_is_followed_beyond_what_a_pinhole_explains() {
+    let directory = tempfile::tempdir().unwrap();
+    let frame = directory.path().join("frame.tif");
+    let ran = Ran::new(
+        starpipe()
+            .args(["simulate", "--preset=imx174-35mm", "--seed=77029"])
+            .args(["--width-px=2291", "--height-px=2291"])
+            .args(["--pitch-x-um=4", "--pitch-y-um=4"])
+            .args(["--focal-length-mm=4.9458", "--aperture-mm=1.567"])
+            .args(["--spot-sigma-px=1.173", "--projection=orthographic"])
+            .args(["--field-radius-deg=61.47", "--distortion-px=17.1"])
+            .args(["--axis-x-px=-27.2", "--axis-y-px=34.1", "--vignetting=0.2"])
+            .args([
+                "--exposure=10",
+                "--sky-mag-arcsec2=19.65",
+                "--by-altitude=1",
+            ])
+            .args(["--ra=333.766", "--dec=37.268", "--roll=110.06"])
+            .args(["--cloud-mag=2.35", "--cloud-size-px=156"])
+            .args(["--cloud-light=0.756", "--skyline-deg=10.53"])
+            .arg(format!("--out={}", frame.display())),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let ran = Ran::new(starpipe().args(["process", "--format=json"]).arg(&frame));
+    let found = report(&ran);
+    assert_ne!(found["optics"]["model"], "pinhole");
+    let named = number(&found, "/match/matched") / number(&found, "/match/detected");
+    assert!(named > 0.75, "{named}");
+    let valid_to_deg = number(&found, "/optics/valid_to_deg");
+    assert!((59.0..62.0).contains(&valid_to_deg), "{valid_to_deg}");
+}
+
 #[test]
 fn photographs_of_the_whole_sky_are_identified_with_nothing_given() {
     let Some(shared) = shared_dir() else {

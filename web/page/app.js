@@ -39,7 +39,11 @@ const prepared = photo();
 
 // It loads all files once more, most of them from the browser's cache: what the visitor waits for comes first.
 if ("serviceWorker" in navigator) {
-  prepared.then(() => navigator.serviceWorker.register("sw.js")).then(() => navigator.serviceWorker.ready).then(
+  /** Fails where there is no room for the files. @param {ServiceWorkerRegistration} registration */
+  const refused = ({ installing }) => new Promise((_, fail) => {
+    installing?.addEventListener("statechange", () => { if (installing.state === "redundant") fail(new Error("no room")); });
+  });
+  prepared.then(() => navigator.serviceWorker.register("sw.js")).then((found) => Promise.race([navigator.serviceWorker.ready, refused(found)])).then(
     () => { byId("offline").textContent = "Ready to work offline."; },
     () => { byId("offline").textContent = "This browser does not keep it for offline use."; },
   );
