@@ -1,10 +1,10 @@
 //! How the camera stands, and when it was moved.
 
 use super::row::NightRow;
-use crate::base::coords::{Camera, Horizon, Rotation};
+use crate::base::coords::{Camera, Horizon, Rotation, small_turn_rad};
 use crate::base::statistics::median;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use std::collections::VecDeque;
 
@@ -138,9 +138,8 @@ impl PointingHistory {
 
     fn turns(&self, from: Rotation<Horizon, Camera>) -> impl Iterator<Item = Vector3<f64>> {
         let back: Matrix3<f64> = from.matrix().transpose();
-        let turn = move |pointed: &Pointed| {
-            Rotation3::from_matrix_unchecked(pointed.pointing.matrix() * back).scaled_axis()
-        };
+        // They agree, so the turns are small.
+        let turn = move |pointed: &Pointed| small_turn_rad(&(pointed.pointing.matrix() * back));
         self.recent.iter().map(turn)
     }
 
@@ -212,5 +211,18 @@ mod tests {
         let history = after(&drifting);
         assert!(history.knocks().is_empty());
         assert!(history.held().unwrap().0.angle_to(&turned(0.4)) < 0.02 * RAD_PER_DEG);
+    }
+
+    #[test]
+    fn the_same_pointing_again_is_no_shift() {
+        for number in 1..1000 {
+            let part = |factor: f64| (factor * f64::from(number)).sin();
+            let pointing = Rotation::from_quaternion([1e-6, part(1.1), part(2.3), part(0.7)]);
+            let mut history = PointingHistory::new(None);
+            for frame in 0..4 {
+                let shift_rad = history.take(frame, pointing, SIGMA_RAD);
+                assert!(shift_rad < 1e-9, "{number}: {shift_rad}");
+            }
+        }
     }
 }

@@ -6,7 +6,7 @@ use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
 use nalgebra::{SMatrix, SVector};
 
-/// A plane, and where it does not hold.
+/// A plane, and what is not in it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BackgroundPlane {
     /// Background in the first pixel of the window, in ADU.
@@ -29,13 +29,12 @@ impl BackgroundPlane {
     pub fn in_window(view: &View<'_>, map: &Mesh, window: &Window) -> Self {
         let of_map = Self::of_map(map, window);
         let [x, y] = [window.x0 + window.width / 2, window.y0 + window.height / 2];
-        if map.is_bent_at(x as f32, y as f32) {
-            of_map
-                .through_ring(view, window, f64::from(map.at(x as f32, y as f32).1))
-                .unwrap_or(of_map)
-        } else {
-            of_map
+        let [x, y] = [x as f32, y as f32];
+        if !map.is_bent_at(x, y) {
+            return of_map;
         }
+        let (_, noise_adu) = map.at(x, y);
+        Self::through_ring(view, window, f64::from(noise_adu)).unwrap_or(of_map)
     }
 
     /// That of the map.
@@ -69,7 +68,7 @@ impl BackgroundPlane {
 
     /// That through the pixels in a ring around the window, without stars, on this side of an edge. `None`
     /// where they are too few.
-    fn through_ring(self, view: &View<'_>, window: &Window, noise_adu: f64) -> Option<Self> {
+    fn through_ring(view: &View<'_>, window: &Window, noise_adu: f64) -> Option<Self> {
         let mut ring = ring_around(view, window);
         let edge = Edge::in_ring(&ring, noise_adu);
         if let Some(edge) = edge {
