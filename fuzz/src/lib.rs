@@ -2,7 +2,7 @@
 //! are numbers that can be.
 //!
 //! Each target is a function of bytes. `cargo fuzz run TARGET` looks for bytes that break it;
-//! `cargo test` replays those in `corpus/` and changes of them.
+//! the tests of starpipe replay those in `corpus/` and changes of them.
 
 mod frames;
 mod pipeline;

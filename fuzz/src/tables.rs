@@ -1,6 +1,6 @@
 //! Readers of catalogues, descriptions and tables.
 
-use crate::scratch::{directory, with_file};
+use super::scratch::{directory, with_file};
 use starpipe::archive::names_in;
 use starpipe::calibration::read_hot_pixels;
 use starpipe::camera::data_sheet::{DataSheet, Response, SpotImage};
@@ -73,7 +73,7 @@ pub fn index(changes: &[u8]) {
     };
     assert_eq!(indexed.stars().len(), catalog.stars().len());
     // Damage behind the table is found when it is used, and mended.
-    crate::pipeline::identify_some(&indexed);
+    super::pipeline::identify_some(&indexed);
     let _ = indexed.take_cache_errors();
 }
 

@@ -20,6 +20,22 @@ pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
+/// The number of standard deviations below which a normal deviate is with `probability`; within ±8.
+pub fn normal_quantile(probability: f64) -> f64 {
+    const END: f64 = 8.0;
+    const BISECTIONS: usize = 30;
+    let (mut low, mut high) = (-END, END);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if normal_cdf(middle) < probability {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
 /// The density of the normal distribution at `z` standard deviations.
 pub fn normal_density(z: f64) -> f64 {
     libm::exp(-0.5 * z * z) / (2.0 * PI).sqrt()

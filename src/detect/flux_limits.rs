@@ -36,9 +36,10 @@ impl FluxLimits {
             for column in 0..grid.columns {
                 let x = middle(column, grid.columns, view.width);
                 let (_, noise_adu) = background.at(x, y);
-                let (mean, sigma) = filtered.at(x, y);
-                let limit = threshold as f32 * sigma + mean;
-                self.adu.push(limit * noise_adu / gain as f32);
+                // The threshold is above the local mean of the filtered frame, and so is the star.
+                let (_, sigma) = filtered.at(x, y);
+                self.adu
+                    .push(threshold as f32 * sigma * noise_adu / gain as f32);
             }
         }
     }

@@ -299,12 +299,11 @@ impl FrameSearch {
         };
         view.check()?;
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config)?;
-        let mean = median(&filtered.mesh.background, sorted);
         let sigma = median(&filtered.mesh.sigma, sorted);
         Ok(FilterPass {
             matched_gain: kernel.matched_gain(),
             threshold,
-            threshold_level: mean + threshold * sigma,
+            threshold_level: threshold * sigma,
             noise_tail,
         })
     }

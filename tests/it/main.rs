@@ -23,6 +23,7 @@ mod experiment;
 mod faults;
 mod fixtures;
 mod frames;
+mod fuzz_replay;
 mod identify;
 mod interrupt;
 mod layering;

@@ -3,7 +3,6 @@
 mod args;
 mod files;
 mod hot;
-mod journal;
 mod order;
 mod page;
 mod run;
@@ -15,9 +14,9 @@ use super::exit::{CommandError, Exit, Outcome};
 use super::input::names::frame_names;
 use super::options::format::PageFormat;
 use super::output::files::{make_directory, write_whole};
+use super::output::journal::Journal;
 use super::output::rows::json_line;
 use super::solving::Plan;
-use journal::Journal;
 use run::{BATCH, Measured, Run};
 use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::lens::MEASURED_BY;

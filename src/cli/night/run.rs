@@ -1,7 +1,7 @@
 //! The frames of a night, batch by batch.
 
-use super::journal::Journal;
 use crate::cli::exit::CommandError;
+use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{Inputs, Plan, Sink, Solved, Solver};
@@ -15,6 +15,12 @@ use std::sync::Arc;
 
 /// Frames that are solved with the same pointing, whatever the number of threads.
 pub(super) const BATCH: usize = 8;
+
+impl JournalRow for NightRow {
+    fn name(&self) -> String {
+        self.frame.clone()
+    }
+}
 
 /// What a night is measured with.
 pub(super) struct Run<'a> {

@@ -14,6 +14,8 @@ use std::path::PathBuf;
 pub(crate) enum Suite {
     /// Lenses, spots and detectors that are not what the pipeline assumes
     Hard,
+    /// Skies with Moon, clouds and extinction over an all-sky camera, which looks at the zenith
+    Sky,
 }
 
 #[derive(Debug, Args)]
@@ -22,12 +24,14 @@ pub(crate) enum Suite {
     starpipe validate --preset nanosat-tracker --exposure 0.2 --scale-unknown --out validation --html\n  \
     starpipe validate --camera camera.toml --count 500 --sweep read_noise_e=1:30:7:log --out study\n  \
     starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n  \
-    starpipe validate --camera camera.toml --count 200 --suite hard --out hard\n\n\
+    starpipe validate --camera camera.toml --count 200 --suite hard --out hard\n  \
+    starpipe validate --camera all-sky.toml --count 300 --suite sky --out sky\n\n\
     Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
     gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
     frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
     writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json;\n\
-    a suite does so in DIR/CASE/, suite.csv, suite.json and suite.txt.\n\n\
+    the hard suite does so in DIR/CASE/, suite.csv, suite.json and suite.txt. The sky suite writes frames.csv,\n\
+    cells.csv and the same summary.\n\n\
     A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
     --count extends it. The results are the same to the last byte on any number of threads.")]
 pub(crate) struct ValidateArgs {

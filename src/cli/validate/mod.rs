@@ -7,6 +7,7 @@ mod page;
 mod parquet;
 mod run;
 mod shared;
+mod sky;
 mod study;
 mod suite;
 mod sweep;
@@ -34,6 +35,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
     let study_runs = study::runs(&arguments.sweep, &protocol)?;
     let runs = match arguments.suite {
         Some(Suite::Hard) => HARD_SUITE.len(),
+        Some(Suite::Sky) => 1,
         None => study_runs.len().max(1),
     } as u64;
     let default = || arguments.out.join("validate.html");
@@ -50,7 +52,17 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
             progress: frames_bar_with_speed(arguments.count * runs),
         };
         let camera = &protocol.setup.scenario.camera.name;
-        let (text, page): (String, Page) = if arguments.suite.is_some() {
+        let (text, page): (String, Page) = if arguments.suite == Some(Suite::Sky) {
+            let (summary, trials) = sky::run(&arguments.out, &protocol, &shared)?;
+            let text = match arguments.format {
+                PageFormat::Text => summary.to_text(),
+                PageFormat::Json => json_line(&summary)?,
+            };
+            (
+                text,
+                page::of_sky(camera, &summary, &sky::sheet(&trials, &summary))?,
+            )
+        } else if arguments.suite.is_some() {
             let (rows, failed) = suite::run(&arguments.out, &protocol, &shared)?;
             let text = match arguments.format {
                 PageFormat::Text => HardRow::to_text(&rows),

@@ -5,10 +5,12 @@ use super::frames::{FailedFrames, FrameRow, MOST_ROWS};
 use super::run::Run;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, codes_note, figure, options, table};
+use crate::cli::plot::Sheet;
 use serde::Serialize;
 use starpipe::base::format::{counted, five_digits};
 use starpipe::report::page::{Fact, Page, PageTable};
 use starpipe::sky::catalog::Catalog;
+use starpipe::study::night_sky::SkySummary;
 use starpipe::study::validation::{HardRow, Pull, StudyRow, Summary};
 use std::collections::BTreeMap;
 
@@ -74,6 +76,32 @@ pub(super) fn of_suite(
     };
     add_failed(&mut page, failed)?;
     Ok(page)
+}
+
+/// The page of the sky suite.
+pub(super) fn of_sky(camera: &str, summary: &SkySummary, sheet: &Sheet) -> anyhow::Result<Page> {
+    let all = summary.groups.first();
+    Ok(Page {
+        title: format!("Skies over {camera}"),
+        question: format!(
+            "How accurate are brightness, extinction, clouds and limits of the sky? {}.",
+            counted(all.map_or(0, |all| all.frames), "simulated frame")
+        ),
+        answer: all.map_or_else(String::new, |all| rates([all.frames, all.right, all.wrong])),
+        text: summary.to_text(),
+        figures: vec![figure(
+            sheet,
+            "Errors of the sky, and what its probabilities are worth",
+        )?],
+        tables: vec![
+            table("Groups", &csv_table(summary.groups.iter())?)?,
+            table(
+                "Probability of a clear sky",
+                &csv_table(summary.clear.iter())?,
+            )?,
+        ],
+        ..Page::default()
+    })
 }
 
 /// The page of a study.

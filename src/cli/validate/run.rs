@@ -80,7 +80,7 @@ pub(super) fn run(
 }
 
 /// A directory that holds something else is an error of the command line.
-fn claim_error(error: StoreError) -> CommandError {
+pub(super) fn claim_error(error: StoreError) -> CommandError {
     match error {
         StoreError::OtherRun { .. } | StoreError::UnknownRun { .. } => {
             CommandError::Usage(format!("{error}; choose another directory for --out"))

@@ -15,7 +15,7 @@
 use super::censored_noise::CensoredNoise;
 use super::grid::CellGrid;
 use super::mesh::Mesh;
-use crate::base::statistics::normal_cdf;
+use crate::base::statistics::normal_quantile;
 use crate::detect::pixels::View;
 
 /// Noise whose background is more than this many standard deviations above the lowest value is not
@@ -230,22 +230,6 @@ fn gaussian_beneath(
         sigma,
         edge,
     })
-}
-
-/// The number of standard deviations below which a normal deviate is with `probability`.
-fn normal_quantile(probability: f64) -> f64 {
-    const END: f64 = 8.0;
-    const BISECTIONS: usize = 30;
-    let (mut low, mut high) = (-END, END);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (low + high);
-        if normal_cdf(middle) < probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
 }
 
 #[cfg(test)]

@@ -40,6 +40,7 @@ mod skyline;
 mod spot;
 mod stars;
 mod strays;
+mod true_sky;
 mod truth;
 mod truth_table;
 
@@ -57,6 +58,8 @@ pub use simulator::Simulator;
 #[doc(hidden)]
 pub use simulator::star_field;
 pub use strays::{CosmicRay, Trail};
+#[doc(hidden)]
+pub use true_sky::TrueSky;
 pub use truth::{TrueStar, Truth};
 #[doc(hidden)]
 pub use truth_table::{TruthRow, truth_table};

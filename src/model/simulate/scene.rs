@@ -44,6 +44,8 @@ pub struct Scene {
     pub cloud_size_px: f64,
     /// Light that the thickest cloud adds, relative to the clear sky.
     pub cloud_light: f64,
+    /// Share of the sky that clouds cover on average; half by default.
+    pub cloud_share: Option<f64>,
     /// With it clouds are one bank: how far from the frame's centre its front is, towards
     /// [`Self::cloud_bank_deg`], in pixels.
     pub cloud_bank_px: Option<f64>,
@@ -105,6 +107,7 @@ impl Default for Scene {
             cloud_mag: 0.0,
             cloud_size_px: 200.0,
             cloud_light: 0.0,
+            cloud_share: None,
             cloud_bank_px: None,
             cloud_bank_deg: None,
             cloud_bank_width_px: None,
@@ -250,6 +253,11 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         cloud_light,
         Limits::NotNegative,
         "light that the thickest cloud adds, relative to the clear sky"
+    ),
+    optional_key!(
+        cloud_share,
+        Limits::FromTo(0.0, 1.0),
+        "part of the sky that clouds cover on average (else half)"
     ),
     optional_key!(
         cloud_bank_px,

@@ -4,7 +4,7 @@ use super::camera::{Pointing, camera_of};
 use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
-use super::lights::lights;
+use super::lights::{Light, lights};
 use super::motion::Motion;
 use super::pattern::DetectorPattern;
 use super::poisson::PoissonTable;
@@ -14,6 +14,7 @@ use super::sky::Sky;
 use super::spot::SpotRenderer;
 use super::stars::StarSampler;
 use super::strays::{self, CosmicRay, Trail};
+use super::true_sky::TrueSky;
 use super::truth::{TrueStar, Truth};
 use crate::base::coords::PixelPoint;
 use crate::camera::CameraModel;
@@ -158,6 +159,31 @@ impl<'a> Simulator<'a> {
         })
     }
 
+    /// The true sky of the frame with this `seed`.
+    #[doc(hidden)]
+    pub fn true_sky(&self, seed: u64) -> TrueSky<'_> {
+        let mut random = random(seed, FrameStream::Scene);
+        // As for a frame: what is drawn before the clouds.
+        self.scene.angular_rate_rad_s(&mut random);
+        TrueSky {
+            sky: Sky::new(&self.scenario, &self.scene, &self.camera, &mut random),
+            lights: self.lights(seed),
+            camera: &self.camera,
+            mag_arcsec2: self.scenario.conditions.sky.mag_arcsec2(),
+            sky_e: self.light.budget().background_e,
+        }
+    }
+
+    fn lights(&self, seed: u64) -> Vec<Light> {
+        let random = random(seed, FrameStream::Lights);
+        lights(
+            (&self.scenario, &self.scene),
+            &self.camera,
+            &self.light,
+            random,
+        )
+    }
+
     /// A frame of stars at these positions, with these V magnitudes and the scenario's temperature,
     /// instead of the catalogue's.
     ///
@@ -248,9 +274,7 @@ impl<'a> Simulator<'a> {
         for trail in &trails {
             self.draw_trail(trail, &sky, &mut image, &mut spot);
         }
-        let lamps = self::random(seed, FrameStream::Lights);
-        let place = (&self.scenario, scene);
-        for light in lights(place, &self.camera, &self.light, lamps) {
+        for light in self.lights(seed) {
             light.draw(&mut image);
         }
         let cosmic_rays = strays::cosmic_rays(scene, sheet, &self.camera, exposure_s, &mut random);

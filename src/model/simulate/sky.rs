@@ -5,6 +5,7 @@ use super::lights::{moon_direction, moon_vmag};
 use super::scene::Scene;
 use super::skyline::{Skyline, zenith_of};
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
+use crate::base::statistics::normal_quantile;
 use crate::camera::CameraModel;
 use crate::camera::data_sheet::lens_transmission;
 use crate::model::sensitivity::{REFERENCE_NM, Scenario};
@@ -122,8 +123,31 @@ impl<'a> Sky<'a> {
         }
     }
 
+    /// Magnitudes by which clouds dim stars at `place`.
+    pub(super) fn clouds_mag(&self, place: &PixelPoint) -> f64 {
+        let clouds = self.clouds.as_ref();
+        clouds.map_or(0.0, |clouds| clouds.dims_by_mag(place))
+    }
+
+    /// Light at `place` over that of the uniform sky of the scenario, as [`expose`](Self::expose) draws it,
+    /// but without interpolation, skyline and vignetting; `None` where the lens images nothing.
+    pub(super) fn light(&self, place: &PixelPoint) -> Option<f64> {
+        self.camera.direction_of(place)?;
+        let centre = self.camera.centre();
+        let [x, y] = [place.x - centre.x, place.y - centre.y];
+        let gradient = 1.0 + self.slope[0] * x + self.slope[1] * y;
+        let moon = self.moonlight.as_ref();
+        let moon = moon.map_or(0.0, |moon| moon.at(self.camera, place));
+        let cloud = self.clouds.as_ref().map_or(0.0, |clouds| {
+            clouds.light * Clouds::thickness_of(clouds.height(place))
+        });
+        let altitudes = self.altitudes.as_ref();
+        let glow = altitudes.map_or(1.0, |altitudes| altitudes.glow(place, self.camera));
+        Some(gradient.max(0.0) * glow * (1.0 + moon + cloud))
+    }
+
     /// Transmission of the lens relative to the centre.
-    fn lens(&self, place: &PixelPoint) -> f64 {
+    pub(super) fn lens(&self, place: &PixelPoint) -> f64 {
         lens_transmission(self.vignetting, self.camera.off_centre_sq(place))
     }
 }
@@ -165,6 +189,8 @@ struct Clouds {
     /// Light of the thickest cloud relative to the clear sky.
     light: f64,
     size_px: f64,
+    /// What is added to the field, so that the stated share of it is above 0.
+    raised: f64,
     /// Wave number along x and y in 1/px, and phase.
     waves: [[f64; 3]; WAVES],
     bank: Option<Bank>,
@@ -219,6 +245,7 @@ impl Clouds {
             extinction_mag: scene.cloud_mag,
             light: scene.cloud_light,
             size_px: scene.cloud_size_px,
+            raised: scene.cloud_share.map_or(0.0, normal_quantile),
             waves: std::array::from_fn(|_| wave()),
             bank: Bank::new(scene, camera),
         }
@@ -237,9 +264,9 @@ impl Clouds {
         }
         let wave = |[a, b, phase]: [f64; 3]| libm::cos(a * place.x + b * place.y + phase);
         let sum: f64 = self.waves.map(wave).iter().sum();
-        // The sum has a variance of half the number of waves: half of the sky is clear, a sixth
-        // fully covered.
-        sum / (WAVES as f64 / 2.0).sqrt()
+        // The sum has a variance of half the number of waves: by default half of the sky is clear, a
+        // sixth fully covered.
+        sum / (WAVES as f64 / 2.0).sqrt() + self.raised
     }
 
     /// Relative thickness from 0 (clear) to 1 (thickest).
@@ -247,11 +274,12 @@ impl Clouds {
         height.clamp(0.0, 1.0)
     }
 
+    fn dims_by_mag(&self, place: &PixelPoint) -> f64 {
+        self.extinction_mag * Self::thickness_of(self.height(place))
+    }
+
     fn transmission(&self, place: &PixelPoint) -> f64 {
-        libm::pow(
-            10.0,
-            -0.4 * self.extinction_mag * Self::thickness_of(self.height(place)),
-        )
+        libm::pow(10.0, -0.4 * self.dims_by_mag(place))
     }
 }
 
@@ -314,7 +342,7 @@ impl Altitudes {
 }
 
 /// The solid angle of a pixel: the triangle of three of its corners, twice.
-fn solid_angle_sr(camera: &CameraModel, place: &PixelPoint) -> Option<f64> {
+pub(super) fn solid_angle_sr(camera: &CameraModel, place: &PixelPoint) -> Option<f64> {
     let corner = |dx: f64, dy: f64| {
         let place = PixelPoint::new(place.x + dx, place.y + dy);
         Some(*camera.direction_of(&place)?.as_vector())

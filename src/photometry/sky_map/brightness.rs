@@ -12,17 +12,13 @@ use crate::model::sensitivity::SkyBrightness;
 use crate::photometry::{IdentifiedFrame, instrumental_mag};
 use std::f64::consts::PI;
 
-/// B−V of the sky between stars: 0.6 by moonlight, 0.9 to 1.0 without (Patat 2003, A&A 400, 1183).
-const SKY_BV_MAG: Estimate = Estimate {
-    value: 0.8,
-    sigma: 0.2,
-};
 /// Full width at half maximum of what a meter of the sky's brightness sees, in degrees.
 const METER_DEG: f64 = 20.0;
 /// How far from the zenith it sees, in degrees.
 const METER_REACH_DEG: f64 = 30.0;
-/// Side of the cells in which the background is measured, in pixels.
-const MESH_PX: usize = 64;
+/// Sides of the cells in which the background is measured, in pixels: as broad as the sky's where these are
+/// not broader.
+const MESH_PX: [f64; 2] = [16.0, 64.0];
 
 /// Why no brightness was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,7 +131,9 @@ impl Levels {
         let (width, height) = (picture.frame.width, picture.frame.height);
         let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
         let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
-        let background = BackgroundMap::measure(picture.frame, MESH_PX);
+        let [least_px, most_px] = MESH_PX;
+        let mesh_px = grid.breadth_px().clamp(least_px, most_px) as usize;
+        let background = BackgroundMap::measure(picture.frame, mesh_px);
         let dark_adu = picture.dark_adu.unwrap_or(0.0);
         let mut levels = Self {
             cells: vec![CellLevel::default(); grid.places.len()],
@@ -225,13 +223,12 @@ impl Sum {
         if light.is_nan() || light <= 0.0 {
             return None;
         }
-        let zero_point = clear_sky.at_ground(SKY_BV_MAG.value);
+        let zero_point = clear_sky.for_sky();
         let mag = zero_point.value + instrumental_mag(light);
-        let by_color_mag = clear_sky.color_term.value * SKY_BV_MAG.sigma;
         Some(SkyLight {
             mag_arcsec2: Estimate {
                 value: mag,
-                sigma: libm::hypot(zero_point.sigma, by_color_mag),
+                sigma: zero_point.sigma,
             },
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
         })

@@ -1,7 +1,7 @@
 //! The air without clouds: the zero point outside the atmosphere, and extinction per airmass.
 //!
 //! ```text
-//! V = Z + m + c (B−V − 0.6) − k X − a ρ² − b ρ⁴ + s (V − V̄)
+//! V = Z + m + c (B−V − 0.6) + q (B−V − 0.6)² − k X − a ρ² − b ρ⁴ + s (V − V̄)
 //! ```
 //!
 //! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field; s is 0 where gray
@@ -15,12 +15,13 @@ use crate::photometry::Measured;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use nalgebra::{SMatrix, SVector};
 
-/// Unknowns: Z, c, k, a, b, s.
-const UNKNOWNS: usize = 6;
+/// Unknowns: Z, c, k, a, b, s, q.
+const UNKNOWNS: usize = 7;
 const COLOR: usize = 1;
 const EXTINCTION: usize = 2;
 const VIGNETTING: [usize; 2] = [3, 4];
 const SLOPE: usize = 5;
+const COLOR_CURVE: usize = 6;
 /// Extinction in V, in magnitudes per airmass, and how it differs from place to place and night to night
 /// (Patat et al. 2011, A&A 527, A91, for Paranal: 0.12; 0.2 to 0.3 near sea level).
 const USUAL_EXTINCTION: Estimate = Estimate {
@@ -29,6 +30,16 @@ const USUAL_EXTINCTION: Estimate = Estimate {
 };
 /// Color terms of cameras.
 const USUAL_COLOR_SIGMA: f64 = 0.3;
+/// Their change with color: 0 in a band as V, 0.12 without a filter (black bodies from 400 to 800 nm).
+const USUAL_COLOR_CURVE: Estimate = Estimate {
+    value: 0.06,
+    sigma: 0.06,
+};
+/// B−V of the sky between stars: 0.6 by moonlight, 0.9 to 1.0 without (Patat 2003, A&A 400, 1183).
+pub(super) const SKY_BV_MAG: Estimate = Estimate {
+    value: 0.8,
+    sigma: 0.2,
+};
 /// Loss of light at the edge where no flat removed it, in magnitudes: of the terms with ρ² and ρ⁴.
 const USUAL_LOSS: [Estimate; 2] = [
     Estimate {
@@ -79,8 +90,8 @@ pub struct ClearSky {
     unknowns: [f64; UNKNOWNS],
     /// V̄.
     mean_vmag: f64,
-    /// Error of the zero point seen through one airmass.
-    ground_sigma_mag: f64,
+    /// Error of the zero point for the sky's light.
+    sky_sigma_mag: f64,
 }
 
 /// A fit.
@@ -222,11 +233,15 @@ impl ClearSky {
         row.iter().zip(self.unknowns).map(|(a, b)| a * b).sum()
     }
 
-    /// The zero point for light of a color at the ground, at the frame's centre, and its error.
-    pub(super) fn at_ground(&self, bv_mag: f64) -> Estimate {
+    /// The zero point for the sky's light at the ground, at the frame's centre; the error contains that of the
+    /// sky's color.
+    pub(super) fn for_sky(&self) -> Estimate {
+        let row = row_of(None, 0.0, Some(SKY_BV_MAG.value), 0.0);
+        let off_mag = SKY_BV_MAG.value - REFERENCE_BV_MAG;
+        let per_mag = self.unknowns[COLOR] + 2.0 * self.unknowns[COLOR_CURVE] * off_mag;
         Estimate {
-            value: self.unknowns[0] + self.unknowns[COLOR] * (bv_mag - REFERENCE_BV_MAG),
-            sigma: self.ground_sigma_mag,
+            value: self.dot(row),
+            sigma: libm::hypot(self.sky_sigma_mag, per_mag * SKY_BV_MAG.sigma),
         }
     }
 
@@ -284,14 +299,16 @@ fn row_of(
     bv_mag: Option<f64>,
     above_mean_mag: f64,
 ) -> [f64; UNKNOWNS] {
+    let off_mag = bv_mag.map_or(0.0, |bv_mag| bv_mag - REFERENCE_BV_MAG);
     [
         1.0,
-        bv_mag.map_or(0.0, |bv_mag| bv_mag - REFERENCE_BV_MAG),
+        off_mag,
         // Without a horizon the zero point is that of the ground.
         -airmass.unwrap_or(0.0),
         -off_centre_sq,
         -off_centre_sq * off_centre_sq,
         above_mean_mag,
+        off_mag * off_mag,
     ]
 }
 
@@ -311,6 +328,7 @@ impl Fit {
             first,
             second,
             of(0.0, USUAL_SLOPE_SIGMA),
+            USUAL_COLOR_CURVE,
         ]
     }
 
@@ -419,8 +437,13 @@ impl Fit {
             errors,
             mean_vmag,
             unknowns: self.unknowns.into(),
-            ground_sigma_mag: self
-                .variance(&SVector::from(row_of(None, 0.0, None, 0.0)))
+            sky_sigma_mag: self
+                .variance(&SVector::from(row_of(
+                    None,
+                    0.0,
+                    Some(SKY_BV_MAG.value),
+                    0.0,
+                )))
                 .sqrt(),
         }
     }

@@ -1,9 +1,10 @@
 //! Clouds: stars that are dimmed, and stars that are missing.
 //!
 //! For the extinction A beyond that of clear air, a star that was measured has the likelihood of its
-//! magnitude, and one that is missing that of not being detected A magnitudes fainter. Beforehand, half of
-//! the sky has the extinction of clear air alone, and the other half more.
+//! magnitude, and one that is missing that of not being detected A magnitudes fainter. A part of the sky has
+//! the extinction of clear air alone, and the other part more: which parts is told by all cells together.
 
+use super::grid::CELLS_OF_A_STAR;
 use super::relative_limit::RelativeLimit;
 use super::witnesses::{Sky, Witness};
 use crate::base::statistics::Estimate;
@@ -23,6 +24,8 @@ const CLOUD_VARIATION: f64 = 0.3;
 const UNTRUE: f64 = 0.02;
 /// Weight of the stars that tell of a cell at least: without any, nothing is known of it.
 const LEAST_WEIGHT: f64 = 0.3;
+/// No cell is more certain of clouds, or of a clear sky, than by this factor.
+const MOST_ODDS: f64 = 1000.0;
 /// Stars that should be detected with at least this probability count as expected.
 const EXPECTED: f64 = 0.9;
 
@@ -39,9 +42,17 @@ pub(super) struct CellClouds {
     pub clear: Option<f64>,
 }
 
+/// Clouds in all cells.
+pub(super) struct Clouds {
+    /// Each cell.
+    pub cells: Vec<CellClouds>,
+    /// Share of the sky that is behind clouds.
+    pub share: Option<Estimate>,
+}
+
 impl Sky<'_> {
-    /// Clouds in each cell.
-    pub(super) fn clouds(&self, witnesses: &[Witness]) -> Vec<CellClouds> {
+    /// Clouds in each cell; `solid_angles_sr` are those of their sky in the frame.
+    pub(super) fn clouds(&self, witnesses: &[Witness], solid_angles_sr: &[f64]) -> Clouds {
         let limit = if self.is_usual {
             Some(RelativeLimit::usual())
         } else {
@@ -51,36 +62,61 @@ impl Sky<'_> {
             .iter()
             .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
             .collect();
-        let of_cell = |cell: usize| {
-            let mut clouds = CellClouds::default();
-            let mut total = [0.0; STEPS];
-            let mut told = 0.0;
-            for (witness, logs) in witnesses.iter().zip(&logs) {
-                let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
-                    continue;
-                };
-                for (total, log) in total.iter_mut().zip(logs) {
-                    *total += weight * log;
-                }
-                let is_expected = limit
-                    .as_ref()
-                    .is_some_and(|limit| limit.probability(witness.relative_mag) > EXPECTED);
-                if is_expected || witness.star.measured.is_some() {
-                    told += weight;
-                }
-                if witness.cell == cell && is_expected {
-                    clouds.expected += 1;
-                    clouds.detected += usize::from(witness.star.is_detected);
-                }
+        let mut cells = vec![CellClouds::default(); self.grid.places.len()];
+        let mut told = Vec::new();
+        for (cell, (clouds, solid_angle_sr)) in cells.iter_mut().zip(solid_angles_sr).enumerate() {
+            let stars = witnesses.iter().zip(&logs);
+            let evidence = self.evidence(cell, stars, limit.as_ref(), clouds);
+            told.extend(
+                evidence
+                    .filter(|_| *solid_angle_sr > 0.0)
+                    .map(|evidence| Told {
+                        cell,
+                        solid_angle_sr: *solid_angle_sr,
+                        evidence,
+                    }),
+            );
+        }
+        let cover = Cover::of(&told);
+        for Told { cell, evidence, .. } in &told {
+            let (clear, extinction_mag) = evidence.posterior(cover.clouded);
+            cells[*cell].clear = Some(clear);
+            cells[*cell].extinction_mag = Some(extinction_mag);
+        }
+        Clouds {
+            share: cover.share(&told),
+            cells,
+        }
+    }
+
+    /// What the stars around a cell tell, if they do; the stars in it are counted in `clouds`.
+    fn evidence<'w>(
+        &self,
+        cell: usize,
+        stars: impl Iterator<Item = (&'w Witness<'w>, &'w [f64; STEPS])>,
+        limit: Option<&RelativeLimit>,
+        clouds: &mut CellClouds,
+    ) -> Option<Evidence> {
+        let mut total = [0.0; STEPS];
+        let mut told = 0.0;
+        for (witness, logs) in stars {
+            let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
+                continue;
+            };
+            for (total, log) in total.iter_mut().zip(logs) {
+                *total += weight * log;
             }
-            if told > LEAST_WEIGHT && self.depths[cell].is_some() {
-                let (clear, extinction_mag) = posterior(&total);
-                clouds.clear = Some(clear);
-                clouds.extinction_mag = Some(extinction_mag);
+            let is_expected =
+                limit.is_some_and(|limit| limit.probability(witness.relative_mag) > EXPECTED);
+            if is_expected || witness.star.measured.is_some() {
+                told += weight;
             }
-            clouds
-        };
-        (0..self.grid.places.len()).map(of_cell).collect()
+            if witness.cell == cell && is_expected {
+                clouds.expected += 1;
+                clouds.detected += usize::from(witness.star.is_detected);
+            }
+        }
+        (told > LEAST_WEIGHT && self.depths[cell].is_some()).then(|| Evidence::of(&total))
     }
 
     /// The logarithm of the likelihood of a star for each extinction.
@@ -108,37 +144,183 @@ impl Sky<'_> {
     }
 }
 
-/// The probability beforehand that the sky is clear.
-pub(super) fn prior_clear() -> f64 {
-    posterior(&[0.0; STEPS]).0
+/// What the stars around a cell tell of it: sums over extinctions, if it is part of the clear sky, and if it is
+/// not.
+#[derive(Debug, Clone, Copy)]
+struct Evidence {
+    clear: Sums,
+    cloud: Sums,
 }
 
-/// The probability that the sky is clear, and the extinction, from the logarithms of the likelihoods of
-/// extinctions.
-fn posterior(ln_likelihoods: &[f64; STEPS]) -> (f64, Estimate) {
-    let largest = ln_likelihoods
-        .iter()
-        .copied()
-        .fold(f64::NEG_INFINITY, f64::max);
-    let extinction = |step: usize| step as f64 * STEP_MAG;
-    let of_clear = |step: usize| libm::exp(-0.5 * (extinction(step) / CLEAR_SIGMA_MAG).powi(2));
-    let of_cloud = |step: usize| libm::exp(-extinction(step) / MEAN_CLOUD_MAG);
-    let sums = |prior: &dyn Fn(usize) -> f64| {
-        let total: f64 = (0..STEPS).map(prior).sum();
-        let mut sums = [0.0; 4];
-        for (step, ln) in ln_likelihoods.iter().enumerate() {
-            let weight = prior(step) / total * libm::exp(ln - largest);
-            sums[0] += weight;
-            sums[1] += weight * extinction(step);
-            sums[2] += weight * extinction(step).powi(2);
-            sums[3] += weight * f64::from(extinction(step) < CLEAR_MAG);
+/// Sums of likelihoods over extinctions.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    all: f64,
+    first: f64,
+    second: f64,
+    below_clear: f64,
+}
+
+impl Evidence {
+    /// From the logarithms of the likelihoods of extinctions.
+    fn of(ln_likelihoods: &[f64; STEPS]) -> Self {
+        let largest = ln_likelihoods
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        let extinction = |step: usize| step as f64 * STEP_MAG;
+        let of_clear = |step: usize| libm::exp(-0.5 * (extinction(step) / CLEAR_SIGMA_MAG).powi(2));
+        let of_cloud = |step: usize| libm::exp(-extinction(step) / MEAN_CLOUD_MAG);
+        let sums = |prior: &dyn Fn(usize) -> f64| {
+            let total: f64 = (0..STEPS).map(prior).sum();
+            let mut sums = Sums::default();
+            for (step, ln) in ln_likelihoods.iter().enumerate() {
+                let weight = prior(step) / total * libm::exp(ln - largest);
+                sums.all += weight;
+                sums.first += weight * extinction(step);
+                sums.second += weight * extinction(step).powi(2);
+                sums.below_clear += weight * f64::from(extinction(step) < CLEAR_MAG);
+            }
+            sums
+        };
+        let mut evidence = Self {
+            clear: sums(&of_clear),
+            cloud: sums(&of_cloud),
+        };
+        evidence.clear = evidence.clear.at_least(evidence.cloud.all / MOST_ODDS);
+        evidence.cloud = evidence.cloud.at_least(evidence.clear.all / MOST_ODDS);
+        evidence
+    }
+
+    /// The probability that the sky is clear, and the extinction, where a share `clouded` of the sky is not part
+    /// of the clear one.
+    fn posterior(&self, clouded: f64) -> (f64, Estimate) {
+        let mean =
+            |of: fn(&Sums) -> f64| (1.0 - clouded) * of(&self.clear) + clouded * of(&self.cloud);
+        let all = mean(|sums| sums.all);
+        let first = mean(|sums| sums.first) / all;
+        let second = mean(|sums| sums.second) / all;
+        let extinction_mag = Estimate {
+            value: first,
+            sigma: (second - first * first).max(0.0).sqrt(),
+        };
+        (mean(|sums| sums.below_clear) / all, extinction_mag)
+    }
+}
+
+impl Sums {
+    /// The same with a sum that is not below `least`.
+    fn at_least(self, least: f64) -> Self {
+        if self.all >= least {
+            return self;
         }
-        sums
-    };
-    let (clear, cloud) = (sums(&of_clear), sums(&of_cloud));
-    let [total, first, second, clear] = [0, 1, 2, 3].map(|i| clear[i] + cloud[i]);
-    let mean = first / total;
-    let sigma = (second / total - mean * mean).max(0.0).sqrt();
-    let extinction_mag = Estimate { value: mean, sigma };
-    (clear / total, extinction_mag)
+        let factor = least / self.all.max(f64::MIN_POSITIVE);
+        Self {
+            all: least,
+            first: self.first * factor,
+            second: self.second * factor,
+            below_clear: self.below_clear * factor,
+        }
+    }
+}
+
+/// A cell of which stars tell.
+struct Told {
+    cell: usize,
+    solid_angle_sr: f64,
+    evidence: Evidence,
+}
+
+/// How much of the sky is not part of the clear one: the share for which what the cells show is most probable.
+struct Cover {
+    clouded: f64,
+    sigma: f64,
+}
+
+impl Cover {
+    fn of(told: &[Told]) -> Self {
+        const STEPS: usize = 200;
+        /// Cells that are clear, and that are not, which the sky has beforehand.
+        const BEFOREHAND: f64 = 0.5;
+        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        // The same stars tell of several cells.
+        let cells = told.len() as f64 / CELLS_OF_A_STAR;
+        let mean = |of: &dyn Fn(&Evidence) -> f64| {
+            let parts = told
+                .iter()
+                .map(|told| told.solid_angle_sr / all_sr * of(&told.evidence));
+            parts.sum::<f64>()
+        };
+        let mut clouded = 0.5;
+        for _ in 0..STEPS {
+            let share = mean(&|of| {
+                clouded * of.cloud.all / (clouded * of.cloud.all + (1.0 - clouded) * of.clear.all)
+            });
+            let share = if told.is_empty() { 0.5 } else { share };
+            clouded = (BEFOREHAND + cells * share) / (2.0 * BEFOREHAND + cells);
+        }
+        let information = mean(&|of| {
+            let slope = of.cloud.all - of.clear.all;
+            (slope / (clouded * of.cloud.all + (1.0 - clouded) * of.clear.all)).powi(2)
+        });
+        Self {
+            clouded,
+            sigma: (cells * information).sqrt().recip().min(0.5),
+        }
+    }
+
+    /// Share of the sky of which stars tell that is behind clouds.
+    fn share(&self, told: &[Told]) -> Option<Estimate> {
+        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        let clouded_sr = told.iter().map(|told| {
+            let (clear, _) = told.evidence.posterior(self.clouded);
+            told.solid_angle_sr * (1.0 - clear)
+        });
+        let clouded_sr: f64 = clouded_sr.sum();
+        (all_sr > 0.0).then(|| Estimate {
+            value: clouded_sr / all_sr,
+            sigma: self.sigma,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cell in which extinctions about one are as likely as `odds` to those about zero.
+    fn told(cell: usize, odds: f64) -> Told {
+        let logs = std::array::from_fn(|step| {
+            let extinction_mag = step as f64 * STEP_MAG;
+            let about = |mag: f64| libm::exp(-0.5 * ((extinction_mag - mag) / 0.1).powi(2));
+            libm::log(about(0.0) + odds * about(1.0) + 1e-9)
+        });
+        Told {
+            cell,
+            solid_angle_sr: 0.01,
+            evidence: Evidence::of(&logs),
+        }
+    }
+
+    #[test]
+    fn all_cells_together_tell_how_much_is_clear() {
+        // Odds that are even for the two parts, as their extinctions have other priors.
+        let cells = |clear: usize, cloudy: usize| -> Vec<Told> {
+            let odds = |cell: usize| if cell < clear { 0.01 } else { 100.0 };
+            (0..clear + cloudy)
+                .map(|cell| told(cell, odds(cell)))
+                .collect()
+        };
+        let mostly_clear = cells(90, 10);
+        let cover = Cover::of(&mostly_clear);
+        let share = cover.share(&mostly_clear).unwrap();
+        assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
+        assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
+        // The same cell is more likely clear where most of the sky is.
+        let doubtful = told(0, 3.0).evidence;
+        let (clear, _) = doubtful.posterior(cover.clouded);
+        let (less, _) = doubtful.posterior(Cover::of(&cells(10, 90)).clouded);
+        assert!(clear > less + 0.3, "{clear} {less}");
+        assert_eq!(Cover::of(&[]).share(&[]), None);
+    }
 }

@@ -6,7 +6,7 @@ use crate::camera::CameraModel;
 use crate::identify::Identification;
 use crate::photometry::IdentifiedFrame;
 use crate::sky::places::StarPlaces;
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Breadth of a ring of altitude.
 const RING_DEG: f64 = 5.0;
@@ -20,6 +20,8 @@ const CELLS_ALONG: f64 = 8.0;
 const REACH: f64 = 1.2;
 /// and the standard deviation of their weights.
 const WEIGHT_SIGMA: f64 = 0.45;
+/// Cells that the same stars tell of: the area of two such weights together, over that of a cell.
+pub(super) const CELLS_OF_A_STAR: f64 = 4.0 * PI * WEIGHT_SIGMA * WEIGHT_SIGMA;
 
 /// Where a part of the sky is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,6 +139,11 @@ impl<'a> Grid<'a> {
         grid
     }
 
+    /// The breadth of a cell near the frame's centre, in pixels.
+    pub(super) fn breadth_px(&self) -> f64 {
+        self.breadth_rad * self.camera().focal_length_px()
+    }
+
     /// The camera.
     pub(super) fn camera(&self) -> &CameraModel {
         &self.found.camera
@@ -175,10 +182,21 @@ impl<'a> Grid<'a> {
         Some(before + ((turn * count as f64) as usize).min(count - 1))
     }
 
+    /// Whether a direction is so near a cell's centre, in reaches of a cell.
+    pub(super) fn is_near(&self, cell: usize, direction: &UnitVector<Icrs>, reaches: f64) -> bool {
+        let reach_rad = reaches * REACH * self.breadth_rad;
+        self.distance_sq(cell, direction)
+            .is_some_and(|distance_sq| distance_sq < reach_rad * reach_rad)
+    }
+
+    fn distance_sq(&self, cell: usize, direction: &UnitVector<Icrs>) -> Option<f64> {
+        Some(2.0 - 2.0 * self.centers[cell]?.dot(direction))
+    }
+
     /// How much a star in a direction tells of a cell: 1 at its centre; `None` if it is far away.
     pub(super) fn weight(&self, cell: usize, direction: &UnitVector<Icrs>) -> Option<f64> {
         let reach_rad = REACH * self.breadth_rad;
-        let distance_sq = 2.0 - 2.0 * self.centers[cell]?.dot(direction);
+        let distance_sq = self.distance_sq(cell, direction)?;
         (distance_sq < reach_rad * reach_rad).then(|| {
             let sigmas_sq = distance_sq / (WEIGHT_SIGMA * self.breadth_rad).powi(2);
             libm::exp(-0.5 * sigmas_sq)

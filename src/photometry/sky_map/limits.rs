@@ -42,17 +42,11 @@ pub(super) fn limits(
     clouds: &[CellClouds],
     stated: Option<&StatedLimit>,
 ) -> Vec<CellLimits> {
-    /// Stars of a limit.
-    const MIN_STARS: usize = 20;
     let is_clear = |cell: usize| clouds[cell].clear.is_some_and(|clear| clear > 0.5);
-    let counted = |witness: &Witness, v_mag: f64| CountedStar {
-        v_mag,
-        detected: witness.star.is_detected,
-    };
     let relative: Vec<CountedStar> = witnesses
         .iter()
         .filter(|witness| is_clear(witness.cell))
-        .map(|witness| counted(witness, witness.relative_mag))
+        .map(|witness| witness.counted(witness.relative_mag))
         .collect();
     let own = completeness::measure(&relative, sky.chance).limit.ok();
     let by_model = stated
@@ -63,21 +57,52 @@ pub(super) fn limits(
         let Some(depth_vmag) = sky.depths[cell] else {
             return CellLimits::default();
         };
-        let near: Vec<CountedStar> = witnesses
-            .iter()
-            .filter(|witness| sky.grid.weight(cell, &witness.star.direction).is_some())
-            .map(|witness| counted(witness, witness.star.v_mag))
-            .collect();
-        let measured = (near.len() >= MIN_STARS)
-            .then(|| completeness::measure(&near, sky.chance).limit.ok())
-            .flatten();
+        let over = over_depth.and_then(|expected| {
+            let alike = |other: usize| is_clear(other) == is_clear(cell);
+            measured_over_depth(sky, witnesses, cell, expected, alike)
+        });
         CellLimits {
             expected_vmag: over_depth.map(|over| over + depth_vmag),
-            measured_vmag: measured.map(|limit| Estimate {
-                value: limit.v_mag,
-                sigma: limit.sigma_mag,
+            measured_vmag: over.map(|over| Estimate {
+                value: over.value + depth_vmag,
+                ..over
             }),
         }
     };
     (0..clouds.len()).map(of_cell).collect()
+}
+
+/// The limit of the stars around a cell, over the threshold; `expected` is that of a clear sky. Stars that are
+/// not near are those of cells that are `alike`: clear, or behind clouds. `None` where the sky has too few stars,
+/// or clouds hide them.
+fn measured_over_depth(
+    sky: &Sky,
+    witnesses: &[Witness],
+    cell: usize,
+    expected: f64,
+    alike: impl Fn(usize) -> bool,
+) -> Option<Estimate> {
+    /// How much further stars are taken from, where few are near.
+    const REACHES: [f64; 3] = [1.0, 2.0, 4.0];
+    /// Stars above the expected limit. A choice by those that are found would prefer cells in which chance
+    /// shows more.
+    const LEAST_BRIGHT: usize = 12;
+    let near = |reach: f64| -> Vec<CountedStar> {
+        let near = witnesses.iter().filter(|witness| {
+            let is_near = sky.grid.is_near(cell, &witness.star.direction, reach);
+            is_near && (reach == 1.0 || alike(witness.cell))
+        });
+        near.map(|witness| witness.counted(witness.relative_mag))
+            .collect()
+    };
+    let is_enough = |stars: &Vec<CountedStar>| {
+        let bright = stars.iter().filter(|star| star.v_mag < expected);
+        bright.count() >= LEAST_BRIGHT
+    };
+    let stars = REACHES.into_iter().map(near).find(is_enough)?;
+    let limit = completeness::measure(&stars, sky.chance).limit.ok()?;
+    Some(Estimate {
+        value: limit.v_mag,
+        sigma: limit.sigma_mag,
+    })
 }

@@ -125,7 +125,15 @@ pub fn measure(
         is_usual: usual.is_some(),
     };
     let witnesses = sky.witnesses();
-    let clouds = sky.clouds(&witnesses);
+    let solid_angles_sr: Vec<f64> = levels
+        .cells
+        .iter()
+        .map(|cell| cell.solid_angle_sr)
+        .collect();
+    let clouds::Clouds {
+        cells: clouds,
+        share,
+    } = sky.clouds(&witnesses, &solid_angles_sr);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
     let no_brightness = brightness::refusal(picture, &clear_sky);
     let light = |cell: usize| match no_brightness {
@@ -145,7 +153,7 @@ pub fn measure(
     });
     let cells: Vec<SkyCell> = cells.filter(|cell| cell.solid_angle_sr > 0.0).collect();
     Some(SkyMap {
-        cloud_share: cloud_share(&cells),
+        cloud_share: share,
         zenith: no_brightness
             .is_none()
             .then(|| levels.zenith(&clear_sky))
@@ -154,75 +162,4 @@ pub fn measure(
         clear_sky,
         cells,
     })
-}
-
-/// Share of the sky that is behind clouds: the one for which what the cells show is most probable. Each cell
-/// counts by its solid angle, and tells how many times more probable it is with clouds than without.
-///
-/// The mean of what the cells show would be drawn to what is expected beforehand, the more so the fewer stars
-/// there are.
-fn cloud_share(cells: &[SkyCell]) -> Option<Estimate> {
-    const STEPS: usize = 200;
-    /// Probabilities nearer to 0 or 1 are not to be trusted.
-    const SURE: f64 = 0.005;
-    let prior = clouds::prior_clear();
-    let odds = |clear: f64| {
-        let clear = clear.clamp(SURE, 1.0 - SURE);
-        (1.0 - clear) / clear * prior / (1.0 - prior)
-    };
-    let known = cells
-        .iter()
-        .filter_map(|cell| Some((cell.solid_angle_sr, odds(cell.clear?))));
-    let known: Vec<(f64, f64)> = known.collect();
-    let all_sr: f64 = known.iter().map(|(solid_angle_sr, _)| solid_angle_sr).sum();
-    if all_sr.is_nan() || all_sr <= 0.0 {
-        return None;
-    }
-    let mean = |of: &dyn Fn(f64) -> f64| {
-        let parts = known.iter().map(|(sr, odds)| sr / all_sr * of(*odds));
-        parts.sum::<f64>()
-    };
-    let mut share = 0.5;
-    for _ in 0..STEPS {
-        share = mean(&|odds| share * odds / (share * odds + 1.0 - share));
-    }
-    let information = mean(&|odds| ((odds - 1.0) / (share * odds + 1.0 - share)).powi(2));
-    Some(Estimate {
-        value: share,
-        sigma: (information * known.len() as f64).sqrt().recip().min(0.5),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cell(clear: f64) -> SkyCell {
-        SkyCell {
-            place: Place::Frame {
-                x: [0.0, 1.0],
-                y: [0.0, 1.0],
-            },
-            solid_angle_sr: 0.01,
-            light: None,
-            expected: 0,
-            detected: 0,
-            extinction_mag: None,
-            clear: Some(clear),
-            expected_limit_vmag: None,
-            limit_vmag: None,
-        }
-    }
-
-    #[test]
-    fn cells_that_tell_nothing_leave_the_share_to_others() {
-        let nothing = clouds::prior_clear();
-        let mut cells = vec![cell(nothing); 60];
-        cells.extend([cell(0.99); 30]);
-        cells.extend([cell(0.02); 10]);
-        let share = cloud_share(&cells).unwrap();
-        assert!((share.value - 0.25).abs() < 0.03, "{share:?}");
-        assert!((0.04..0.2).contains(&share.sigma), "{share:?}");
-        assert_eq!(cloud_share(&[]), None);
-    }
 }

@@ -10,11 +10,15 @@ pub(super) struct RelativeLimit(Limit);
 impl RelativeLimit {
     /// That of the stars that are not dimmed, as far as is known: clouds are not in it where most of the
     /// sky is clear.
+    ///
+    /// Clouds hide whole stars, too: a larger share of lost ones than is usual is theirs.
     pub(super) fn of_clear_sky(
         witnesses: &[Witness],
         clear_sky: &ClearSky,
         chance: f64,
     ) -> Option<Self> {
+        /// Largest share of bright stars that is lost under a clear sky: doubles, wrong magnitudes.
+        const MOST_LOST: f64 = 0.05;
         /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
         const DIMMED_SIGMAS: f64 = 3.0;
         let is_dimmed = |witness: &&Witness| {
@@ -37,12 +41,13 @@ impl RelativeLimit {
         let counted: Vec<CountedStar> = witnesses
             .iter()
             .filter(is_clear)
-            .map(|witness| CountedStar {
-                v_mag: witness.relative_mag,
-                detected: witness.star.is_detected,
-            })
+            .map(|witness| witness.counted(witness.relative_mag))
             .collect();
-        completeness::measure(&counted, chance).limit.ok().map(Self)
+        let limit = completeness::measure(&counted, chance).limit.ok()?;
+        Some(Self(Limit {
+            lost: limit.lost.min(MOST_LOST),
+            ..limit
+        }))
     }
 
     /// That of most frames: half of the stars at the threshold are above it by their noise.

@@ -4,6 +4,7 @@ use super::clear_sky::ClearSky;
 use super::grid::Grid;
 use super::stars::SkyStar;
 use crate::detect::Detections;
+use crate::photometry::completeness::CountedStar;
 use crate::photometry::instrumental_mag;
 use crate::sky::places::StarPlaces;
 
@@ -37,6 +38,16 @@ pub(super) struct Witness<'a> {
     pub cell: usize,
     /// Its magnitude in clear air over that of the threshold at its place.
     pub relative_mag: f64,
+}
+
+impl Witness<'_> {
+    /// The star with a magnitude, as one that counts in a completeness.
+    pub(super) fn counted(&self, v_mag: f64) -> CountedStar {
+        CountedStar {
+            v_mag,
+            detected: self.star.is_detected,
+        }
+    }
 }
 
 impl Sky<'_> {

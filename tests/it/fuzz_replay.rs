@@ -1,4 +1,9 @@
-//! The inputs in `corpus/`, and changes of them that depend on a seed alone.
+//! The fuzz targets with the inputs in `fuzz/corpus/`, and changes of them that depend on a seed alone.
+
+// Compiled here, so that library and dependencies are not compiled for it once more.
+#[path = "../../fuzz/src/lib.rs"]
+#[allow(dead_code, reason = "the fuzzer looks a target up by its name")]
+mod targets;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +19,7 @@ fn changes(target: &str) -> u64 {
 /// The inputs of a target, by name.
 fn corpus(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let place = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("corpus")
+        .join("fuzz/corpus")
         .join(target);
     let files = fs::read_dir(&place).unwrap_or_else(|error| panic!("{}: {error}", place.display()));
     let mut paths: Vec<PathBuf> = files.map(|file| file.expect("a file").path()).collect();
@@ -59,7 +64,7 @@ fn changed(input: &[u8], seed: u64) -> Vec<u8> {
 
 #[test]
 fn all_targets_hold_for_the_corpus_and_changes_of_it() {
-    for (name, target) in starpipe_fuzz::TARGETS {
+    for (name, target) in targets::TARGETS {
         let inputs = corpus(name);
         assert!(!inputs.is_empty(), "no inputs for {name}");
         for (path, input) in &inputs {

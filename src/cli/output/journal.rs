@@ -1,14 +1,21 @@
-//! The rows of a night, written as they are made: a run that was stopped goes on with them.
+//! Rows of frames, written as they are made: a run that was stopped goes on with them.
 
-use crate::cli::output::rows::json_line;
+use super::rows::json_line;
 use anyhow::{Context, bail};
-use starpipe::night::NightRow;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+/// A row of a frame.
+pub(crate) trait JournalRow: Serialize + DeserializeOwned {
+    /// Name of the frame.
+    fn name(&self) -> String;
+}
+
 /// The file of rows.
-pub(super) struct Journal {
+pub(crate) struct Journal {
     path: PathBuf,
     file: File,
 }
@@ -16,11 +23,11 @@ pub(super) struct Journal {
 impl Journal {
     /// Opens the file of a run over `frames`, and returns it with the rows of the batches of `batch` frames
     /// that are complete in it. The rest is cut off.
-    pub(super) fn open(
+    pub(crate) fn open<Row: JournalRow>(
         path: &Path,
         frames: &[String],
         batch: usize,
-    ) -> anyhow::Result<(Self, Vec<NightRow>)> {
+    ) -> anyhow::Result<(Self, Vec<Row>)> {
         let text = match fs::read(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
             read => read.with_context(|| format!("reading {}", path.display()))?,
@@ -34,14 +41,14 @@ impl Journal {
         };
         let mut rows = Vec::with_capacity(whole);
         for (number, line) in lines[..whole].iter().enumerate() {
-            let row: NightRow = serde_json::from_slice(line)
+            let row: Row = serde_json::from_slice(line)
                 .with_context(|| format!("reading {}, line {}", path.display(), number + 1))?;
-            if frames.get(number) != Some(&row.frame) {
+            if frames.get(number) != Some(&row.name()) {
                 bail!(
                     "{}, line {}: found frame {:?}, expected {:?}",
                     path.display(),
                     number + 1,
-                    row.frame,
+                    row.name(),
                     frames.get(number).map_or("no more", String::as_str)
                 );
             }
@@ -59,7 +66,7 @@ impl Journal {
     }
 
     /// Adds the rows of a batch.
-    pub(super) fn add(&mut self, rows: &[NightRow]) -> anyhow::Result<()> {
+    pub(crate) fn add(&mut self, rows: &[impl JournalRow]) -> anyhow::Result<()> {
         let text: String = rows.iter().map(json_line).collect::<anyhow::Result<_>>()?;
         let written = self.file.write_all(text.as_bytes());
         let written = written.and_then(|()| self.file.sync_data());
@@ -70,6 +77,7 @@ impl Journal {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use starpipe::night::NightRow;
 
     #[test]
     fn complete_batches_are_kept_and_the_rest_is_cut_off() {
@@ -77,7 +85,7 @@ mod tests {
         let path = directory.path().join("night.jsonl");
         let names: Vec<String> = (0..7).map(|n| format!("{n}.fits")).collect();
         let rows: Vec<NightRow> = names.iter().map(|name| NightRow::unread(name)).collect();
-        let (mut journal, none) = Journal::open(&path, &names, 2).unwrap();
+        let (mut journal, none) = Journal::open::<NightRow>(&path, &names, 2).unwrap();
         assert!(none.is_empty());
         journal.add(&rows[..5]).unwrap();
         fs::write(
@@ -85,11 +93,11 @@ mod tests {
             [&fs::read(&path).unwrap()[..], b"{\"frame\":"].concat(),
         )
         .unwrap();
-        let (mut journal, kept) = Journal::open(&path, &names, 2).unwrap();
+        let (mut journal, kept) = Journal::open::<NightRow>(&path, &names, 2).unwrap();
         assert_eq!(kept, rows[..4]);
         journal.add(&rows[4..]).unwrap();
-        let (_, all) = Journal::open(&path, &names, 2).unwrap();
+        let (_, all) = Journal::open::<NightRow>(&path, &names, 2).unwrap();
         assert_eq!(all, rows);
-        assert!(Journal::open(&path, &names[1..], 2).is_err());
+        assert!(Journal::open::<NightRow>(&path, &names[1..], 2).is_err());
     }
 }

@@ -1,0 +1,167 @@
+//! The sky suite: simulated skies, compared with the truth in each cell.
+
+use super::shared::Shared;
+use crate::cli::batch::for_each_ordered;
+use crate::cli::exit::CommandError;
+use crate::cli::output::files::write_into;
+use crate::cli::output::journal::{Journal, JournalRow};
+use crate::cli::output::rows::{csv_table, json_indented};
+use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet, figure_files};
+use starpipe::pipeline::Workspace;
+use starpipe::sky::observer::Site;
+use starpipe::study::night_sky::{FrameRow, SkyStudy, SkySummary, SkyTrial};
+use starpipe::study::validation::Protocol;
+use starpipe::study::validation::store::claim_directory;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Where the frames are taken.
+const SITE_DEG_M: [f64; 3] = [50.0, 10.0, 300.0];
+/// The rows of all frames, as they are made.
+const ROWS: &str = "frames.jsonl";
+
+impl JournalRow for SkyTrial {
+    fn name(&self) -> String {
+        self.frame.frame.to_string()
+    }
+}
+
+/// Measures the frames that `directory` lacks, and writes tables of all.
+pub(super) fn run(
+    directory: &Path,
+    base: &Protocol,
+    shared: &Shared,
+) -> Result<(SkySummary, Vec<SkyTrial>), CommandError> {
+    let [lat_deg, lon_deg, height_m] = SITE_DEG_M;
+    let site = Site::new(lat_deg, lon_deg, height_m).map_err(CommandError::usage)?;
+    let protocol = Protocol {
+        site: Some(site),
+        ..base.clone()
+    };
+    claim_directory(directory, &protocol, shared.indexed.catalog())
+        .map_err(super::run::claim_error)?;
+    let study = SkyStudy {
+        indexed: shared.indexed,
+        setup: protocol.setup,
+        site,
+        seed: protocol.seed,
+    };
+    let numbers: Vec<String> = (0..shared.frames)
+        .map(|number| number.to_string())
+        .collect();
+    let (mut journal, mut trials) = Journal::open::<SkyTrial>(&directory.join(ROWS), &numbers, 1)?;
+    shared.progress.inc(trials.len() as u64);
+    shared.progress.reset_eta();
+    let left: Vec<u64> = (trials.len() as u64..shared.frames).collect();
+    let work = |number: &u64, workspace: &mut Workspace| study.run_one(*number, workspace);
+    let mut failed = Ok(());
+    for_each_ordered(shared.pool, &left, Workspace::new, work, |_, made| {
+        shared.progress.inc(1);
+        let added = made.map_err(anyhow::Error::from).and_then(|trial| {
+            journal.add(std::slice::from_ref(&trial))?;
+            trials.push(trial);
+            Ok(())
+        });
+        match added {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                failed = Err(error);
+                ControlFlow::Break(())
+            }
+        }
+    });
+    failed?;
+    let summary = SkySummary::of(&trials);
+    save(directory, &trials, &summary, shared)?;
+    Ok((summary, trials))
+}
+
+fn save(
+    directory: &Path,
+    trials: &[SkyTrial],
+    summary: &SkySummary,
+    shared: &Shared,
+) -> anyhow::Result<()> {
+    let tables = [
+        (
+            "frames.csv",
+            csv_table(trials.iter().map(|trial| &trial.frame))?,
+        ),
+        (
+            "cells.csv",
+            csv_table(trials.iter().flat_map(|trial| &trial.cells))?,
+        ),
+        ("suite.json", json_indented(summary)?),
+        ("suite.csv", csv_table(summary.groups.iter())?),
+        ("suite.txt", summary.to_text()),
+    ];
+    let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
+    let figures = figure_files(vec![("sky", sheet(trials, summary))], shared.figures)?;
+    write_into(directory, figures.into_iter().chain(tables))?;
+    Ok(())
+}
+
+/// Errors of the frames over what they depend on.
+pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
+    let dots = |value: fn(&FrameRow) -> Option<(f64, f64, f64)>| {
+        let dots = trials.iter().filter_map(|trial| value(&trial.frame));
+        Marks::Dots(
+            dots.map(|(x, y, sigma)| (x, y, [y - sigma, y + sigma]))
+                .collect(),
+        )
+    };
+    let errors = |title: &str, x: &str, y: &str, marks: Marks| Panel {
+        title: title.to_owned(),
+        x: Axis::of(x),
+        y: Axis::of(y),
+        layers: vec![
+            Layer::guide(Marks::Levels(vec![0.0])),
+            Layer::new("frames, with stated errors", BLUE, marks),
+        ],
+    };
+    let zenith = dots(|row| {
+        let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
+        Some((row.true_zenith_mag_arcsec2, error, row.zenith_sigma_mag?))
+    });
+    let extinction = dots(|row| {
+        let error = row.extinction_mag? - row.true_extinction_mag;
+        Some((row.true_extinction_mag, error, row.extinction_sigma_mag?))
+    });
+    let limit = dots(|row| Some((row.true_zenith_mag_arcsec2, row.limit_difference_mag?, 0.0)));
+    let told = summary
+        .clear
+        .iter()
+        .map(|tenth| (tenth.mean_clear, tenth.share_clear));
+    Sheet::new(
+        vec![
+            errors(
+                "Brightness of the zenith",
+                "V in a square arcsecond",
+                "measured − true (mag)",
+                zenith,
+            ),
+            errors(
+                "Extinction",
+                "magnitudes per airmass",
+                "measured − true (mag)",
+                extinction,
+            ),
+            errors(
+                "Limit in clear cells",
+                "V in a square arcsecond at the zenith",
+                "measured − expected (mag)",
+                limit,
+            ),
+            Panel {
+                title: "Probability of a clear sky".to_owned(),
+                x: Axis::of("stated").within(0.0, 1.0),
+                y: Axis::of("share of cells below 0.2 mag").within(0.0, 1.0),
+                layers: vec![
+                    Layer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
+                    Layer::new("found", BLUE, Marks::Line(told.collect())),
+                ],
+            },
+        ],
+        2,
+    )
+}

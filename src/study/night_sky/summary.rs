@@ -1,0 +1,291 @@
+//! Errors over many frames, for groups of frames.
+
+use super::trial::{CellRow, FrameRow, SkyTrial};
+use crate::base::format::{to_decimals, to_significant};
+use crate::photometry::sky_map::CLEAR_MAG;
+use crate::study::robustness::Answer;
+use serde::Serialize;
+
+/// Cells with a mean extinction above this are behind clouds,
+const CLOUDED_MAG: f64 = 0.5;
+/// and below this are clear, where the two are told apart.
+const UNCLOUDED_MAG: f64 = 0.1;
+/// Parts into which probabilities are divided.
+const TENTHS: usize = 10;
+
+/// Whether a frame belongs to a group.
+type Belongs = fn(&FrameRow) -> bool;
+
+/// Groups of frames by name.
+const GROUPS: [(&str, Belongs); 12] = [
+    ("all", |_| true),
+    ("V 20 to 22", |row| row.true_zenith_mag_arcsec2 >= 20.0),
+    ("V 18 to 20", |row| {
+        (18.0..20.0).contains(&row.true_zenith_mag_arcsec2)
+    }),
+    ("brighter", |row| row.true_zenith_mag_arcsec2 < 18.0),
+    ("Moon", |row| row.moon_altitude_deg > 0.0),
+    ("no Moon", |row| row.moon_altitude_deg <= 0.0),
+    ("clouds", |row| row.cloud_mag > 0.0),
+    ("no clouds", |row| row.cloud_mag == 0.0),
+    ("below 5 s", |row| row.exposure_s < 5.0),
+    ("8 bits", |row| row.bits == 8),
+    ("bias known", |row| row.bias_known),
+    ("bias unknown", |row| !row.bias_known),
+];
+
+/// The results of many frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SkySummary {
+    /// Errors in groups of frames; the first is that of all.
+    pub groups: Vec<GroupRow>,
+    /// What the probability of a clear sky is worth.
+    pub clear: Vec<ClearTenth>,
+}
+
+/// Errors in a group of frames, measured less true; a pull is the root mean square of errors over stated
+/// errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupRow {
+    /// Its name.
+    pub group: &'static str,
+    /// Number of frames.
+    pub frames: usize,
+    /// Frames identified rightly.
+    pub right: usize,
+    /// Frames identified wrongly.
+    pub wrong: usize,
+    /// Frames whose sky was measured.
+    pub measured: usize,
+    /// Those of them without a brightness.
+    pub without_brightness: usize,
+    /// Mean error of the zenith's brightness, in magnitudes.
+    pub zenith_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub zenith_sd_mag: Option<f64>,
+    /// Its pull.
+    pub zenith_pull: Option<f64>,
+    /// Mean error of the brightness of cells, in magnitudes.
+    pub cell_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub cell_sd_mag: Option<f64>,
+    /// Its pull.
+    pub cell_pull: Option<f64>,
+    /// Frames whose stars tell the extinction.
+    pub extinction_frames: usize,
+    /// Root mean square of its errors, in magnitudes per airmass.
+    pub extinction_rms_mag: Option<f64>,
+    /// Its pull.
+    pub extinction_pull: Option<f64>,
+    /// Mean over the frames of measured less expected limits in clear cells, in magnitudes.
+    pub limit_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub limit_sd_mag: Option<f64>,
+    /// Root mean square of the errors of the share of clouds.
+    pub cloud_share_rms: Option<f64>,
+    /// Its pull.
+    pub cloud_share_pull: Option<f64>,
+    /// Area under the curve: how many pairs of a cell behind clouds of more than 0.5 mag and one with less than
+    /// 0.1 mag have probabilities of a clear sky in the right order.
+    pub clouds_area: Option<f64>,
+}
+
+/// Cells whose probability of a clear sky is in a tenth of its range.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClearTenth {
+    /// From, to.
+    pub clear_from: f64,
+    /// To.
+    pub clear_to: f64,
+    /// Number of cells.
+    pub cells: usize,
+    /// Mean of their probabilities.
+    pub mean_clear: f64,
+    /// Share of the cells with less than 0.2 mag.
+    pub share_clear: f64,
+}
+
+impl SkySummary {
+    /// The results of `trials`.
+    pub fn of(trials: &[SkyTrial]) -> Self {
+        let rows = GROUPS.iter().map(|(group, belongs)| {
+            let chosen = trials.iter().filter(|trial| belongs(&trial.frame));
+            GroupRow::new(group, &chosen.collect::<Vec<_>>())
+        });
+        Self {
+            groups: rows.collect(),
+            clear: (0..TENTHS)
+                .filter_map(|tenth| ClearTenth::of(tenth, trials))
+                .collect(),
+        }
+    }
+}
+
+impl GroupRow {
+    fn new(group: &'static str, trials: &[&SkyTrial]) -> Self {
+        let frames = || trials.iter().map(|trial| &trial.frame);
+        let cells = || trials.iter().flat_map(|trial| &trial.cells);
+        let count = |holds: Belongs| frames().filter(|row| holds(row)).count();
+        let zenith = Errors::of(frames().map(|row| {
+            let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
+            Some((error, row.zenith_sigma_mag?))
+        }));
+        let cell = Errors::of(cells().map(|row| {
+            let error = row.mag_arcsec2? - row.true_mag_arcsec2;
+            Some((error, row.sigma_mag?))
+        }));
+        let extinction = Errors::of(frames().map(|row| {
+            let error = row.extinction_mag? - row.true_extinction_mag;
+            Some((error, row.extinction_sigma_mag?))
+        }));
+        let limit = Errors::of(frames().map(|row| Some((row.limit_difference_mag?, 1.0))));
+        let share = Errors::of(frames().map(|row| {
+            let error = row.cloud_share? - row.true_cloud_share?;
+            Some((error, row.cloud_share_sigma?))
+        }));
+        Self {
+            group,
+            frames: trials.len(),
+            right: count(|row| row.status == Answer::Right),
+            wrong: count(|row| row.status == Answer::Wrong),
+            measured: count(|row| row.measured),
+            without_brightness: count(|row| row.no_brightness.is_some()),
+            zenith_mean_mag: zenith.mean(),
+            zenith_sd_mag: zenith.sd(),
+            zenith_pull: zenith.pull(),
+            cell_mean_mag: cell.mean(),
+            cell_sd_mag: cell.sd(),
+            cell_pull: cell.pull(),
+            extinction_frames: extinction.0.len(),
+            extinction_rms_mag: extinction.rms(),
+            extinction_pull: extinction.pull(),
+            limit_mean_mag: limit.mean(),
+            limit_sd_mag: limit.sd(),
+            cloud_share_rms: share.rms(),
+            cloud_share_pull: share.pull(),
+            clouds_area: area_under_curve(cells()),
+        }
+    }
+}
+
+/// Errors with their stated standard errors.
+struct Errors(Vec<(f64, f64)>);
+
+impl Errors {
+    fn of(errors: impl Iterator<Item = Option<(f64, f64)>>) -> Self {
+        Self(errors.flatten().collect())
+    }
+
+    fn mean_of(&self, of: impl Fn(&(f64, f64)) -> f64) -> Option<f64> {
+        let Self(errors) = self;
+        let sum: f64 = errors.iter().map(of).sum();
+        (!errors.is_empty()).then(|| sum / errors.len() as f64)
+    }
+
+    fn mean(&self) -> Option<f64> {
+        self.mean_of(|(error, _)| *error).map(rounded)
+    }
+
+    fn sd(&self) -> Option<f64> {
+        let mean = self.mean_of(|(error, _)| *error)?;
+        self.mean_of(|(error, _)| (error - mean).powi(2))
+            .map(|square| rounded(square.sqrt()))
+    }
+
+    fn rms(&self) -> Option<f64> {
+        self.mean_of(|(error, _)| error * error)
+            .map(|square| rounded(square.sqrt()))
+    }
+
+    fn pull(&self) -> Option<f64> {
+        self.mean_of(|(error, sigma)| (error / sigma).powi(2))
+            .map(|square| to_significant(square.sqrt(), 3))
+    }
+}
+
+fn rounded(mag: f64) -> f64 {
+    to_decimals(mag, 4)
+}
+
+/// The area under the curve of true over false positives; `None` without cells of both kinds.
+fn area_under_curve<'a>(cells: impl Iterator<Item = &'a CellRow>) -> Option<f64> {
+    let told = cells.filter_map(|cell| {
+        let is_clouded = cell.true_clouds_mag > CLOUDED_MAG;
+        let is_either = is_clouded || cell.true_clouds_mag < UNCLOUDED_MAG;
+        Some((1.0 - cell.clear?, is_clouded)).filter(|_| is_either)
+    });
+    let mut told: Vec<(f64, bool)> = told.collect();
+    told.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let clouded = told.iter().filter(|(_, is_clouded)| *is_clouded).count() as f64;
+    let pairs = clouded * (told.len() as f64 - clouded);
+    let (mut below, mut right_pairs) = (0.0, 0.0);
+    // Of equal probabilities half of the pairs count.
+    for equal in told.chunk_by(|a, b| a.0 == b.0) {
+        let here = equal.iter().filter(|(_, is_clouded)| *is_clouded).count() as f64;
+        let others = equal.len() as f64 - here;
+        right_pairs += here * (below + 0.5 * others);
+        below += others;
+    }
+    (pairs > 0.0).then(|| rounded(right_pairs / pairs))
+}
+
+impl ClearTenth {
+    fn of(tenth: usize, trials: &[SkyTrial]) -> Option<Self> {
+        let cells = trials.iter().flat_map(|trial| &trial.cells);
+        let told = cells.filter_map(|cell| Some((cell.clear?, cell.true_clouds_mag)));
+        let is_inside =
+            |(clear, _): &(f64, f64)| ((clear * TENTHS as f64) as usize).min(TENTHS - 1) == tenth;
+        let inside: Vec<(f64, f64)> = told.filter(is_inside).collect();
+        let cells = inside.len();
+        let mean = |of: fn(&(f64, f64)) -> f64| inside.iter().map(of).sum::<f64>() / cells as f64;
+        let edge = |tenth: usize| tenth as f64 / TENTHS as f64;
+        (cells > 0).then(|| Self {
+            clear_from: edge(tenth),
+            clear_to: edge(tenth + 1),
+            cells,
+            mean_clear: rounded(mean(|(clear, _)| *clear)),
+            share_clear: rounded(mean(|(_, mag)| f64::from(*mag < CLEAR_MAG))),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(clear: f64, true_clouds_mag: f64) -> CellRow {
+        CellRow {
+            frame: 0,
+            altitude_deg: 45.0,
+            azimuth_deg: 0.0,
+            true_mag_arcsec2: 20.0,
+            mag_arcsec2: None,
+            sigma_mag: None,
+            true_clouds_mag,
+            clouds_mag: None,
+            clouds_sigma_mag: None,
+            clear: Some(clear),
+            limit_difference_mag: None,
+        }
+    }
+
+    #[test]
+    fn the_area_is_the_share_of_pairs_in_the_right_order() {
+        // 0.3 mag is neither behind clouds nor clear.
+        let cells = [(0.9, 0.0), (0.5, 0.0), (0.7, 1.0), (0.1, 2.0), (0.0, 0.3)];
+        let cells = cells.map(|(clear, mag)| cell(clear, mag));
+        assert_eq!(area_under_curve(cells.iter()), Some(0.75));
+        let equal = [cell(0.5, 0.0), cell(0.5, 1.0)];
+        assert_eq!(area_under_curve(equal.iter()), Some(0.5));
+        assert_eq!(area_under_curve(equal[..1].iter()), None);
+    }
+
+    #[test]
+    fn pulls_are_errors_over_stated_errors() {
+        let errors = Errors::of([Some((0.03, 0.01)), None, Some((-0.01, 0.01))].into_iter());
+        assert_eq!(errors.mean(), Some(0.01));
+        assert_eq!(errors.sd(), Some(0.02));
+        assert_eq!(errors.pull(), Some(2.24));
+        assert_eq!(Errors(Vec::new()).rms(), None);
+    }
+}

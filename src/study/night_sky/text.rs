@@ -1,0 +1,81 @@
+//! The summary as text for people.
+
+use super::summary::{ClearTenth, GroupRow, SkySummary};
+use std::fmt::Write as _;
+
+impl SkySummary {
+    /// The summary as text of several lines.
+    pub fn to_text(&self) -> String {
+        let mut text = "Measured less true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.\n\n".to_owned();
+        let _ = writeln!(
+            text,
+            "{:<14} {:>6} {:>6} {:>6} {:>9} {:>22} {:>22} {:>17} {:>16} {:>14} {:>7}",
+            "",
+            "frames",
+            "right",
+            "wrong",
+            "measured",
+            "zenith",
+            "cells",
+            "extinction, RMS",
+            "limit",
+            "clouds, RMS",
+            "area"
+        );
+        for row in &self.groups {
+            text += &line(row);
+        }
+        let _ = writeln!(
+            text,
+            "\nProbability of a clear sky against the share of cells with less than 0.2 mag of clouds\n{:>12} {:>8} {:>8} {:>8}",
+            "", "cells", "mean", "share"
+        );
+        for tenth in &self.clear {
+            let ClearTenth {
+                clear_from,
+                clear_to,
+                cells,
+                mean_clear,
+                share_clear,
+            } = tenth;
+            let _ = writeln!(
+                text,
+                "  {clear_from:.1} to {clear_to:.1} {cells:>8} {mean_clear:>8.3} {share_clear:>8.3}"
+            );
+        }
+        text
+    }
+}
+
+fn line(row: &GroupRow) -> String {
+    let dash = || "–".to_owned();
+    let spread = |mean: Option<f64>, sd: Option<f64>, pull: Option<f64>| {
+        let (Some(mean), Some(sd), Some(pull)) = (mean, sd, pull) else {
+            return dash();
+        };
+        format!("{mean:+.3} ± {sd:.3}, {pull:.2}")
+    };
+    let rms = |rms: Option<f64>, pull: Option<f64>| match (rms, pull) {
+        (Some(rms), Some(pull)) => format!("{rms:.3}, {pull:.2}"),
+        _ => dash(),
+    };
+    let limit = match (row.limit_mean_mag, row.limit_sd_mag) {
+        (Some(mean), Some(sd)) => format!("{mean:+.3} ± {sd:.3}"),
+        _ => dash(),
+    };
+    format!(
+        "{:<14} {:>6} {:>6} {:>6} {:>9} {:>22} {:>22} {:>17} {:>16} {:>14} {:>7}\n",
+        row.group,
+        row.frames,
+        row.right,
+        row.wrong,
+        row.measured,
+        spread(row.zenith_mean_mag, row.zenith_sd_mag, row.zenith_pull),
+        spread(row.cell_mean_mag, row.cell_sd_mag, row.cell_pull),
+        rms(row.extinction_rms_mag, row.extinction_pull),
+        limit,
+        rms(row.cloud_share_rms, row.cloud_share_pull),
+        row.clouds_area
+            .map_or_else(dash, |area| format!("{area:.4}")),
+    )
+}

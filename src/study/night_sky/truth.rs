@@ -1,0 +1,134 @@
+//! The sky that was drawn, as its cells and a meter see it.
+
+use super::conditions::Conditions;
+use crate::base::coords::PixelPoint;
+use crate::base::units::RAD_PER_DEG;
+use crate::identify::Identification;
+use crate::model::simulate::{Pointing, Simulator, TrueSky};
+use crate::photometry::sky_map::{CLEAR_MAG, Place};
+use crate::study::robustness::Answer;
+use std::f64::consts::TAU;
+
+/// Samples of a cell along its altitudes and azimuths.
+const SAMPLES: usize = 6;
+/// What a meter sees: full width at half maximum, and how far from the zenith, in degrees.
+const METER_DEG: f64 = 20.0;
+const METER_REACH_DEG: f64 = 30.0;
+
+/// The sky that was drawn.
+pub(super) struct Truth<'a> {
+    sky: TrueSky<'a>,
+    simulator: &'a Simulator<'a>,
+    pointing: &'a Pointing,
+}
+
+/// A cell of the sky that was drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TrueCell {
+    /// V magnitudes per square arcsecond.
+    pub mag_arcsec2: f64,
+    /// Mean extinction by clouds, in magnitudes.
+    pub clouds_mag: f64,
+    /// Share of it that is behind clouds.
+    pub cloud_share: f64,
+}
+
+impl<'a> Truth<'a> {
+    /// The sky of a frame.
+    pub(super) fn new(
+        simulator: &'a Simulator<'a>,
+        pointing: &'a Pointing,
+        conditions: &Conditions,
+    ) -> Self {
+        Self {
+            sky: simulator.true_sky(conditions.seed),
+            simulator,
+            pointing,
+        }
+    }
+
+    /// Whether the attitude is right.
+    pub(super) fn answer(&self, found: Option<&Identification>) -> Answer {
+        let camera = self.simulator.camera();
+        found.map_or(Answer::None, |found| {
+            Answer::of(found, camera, &self.pointing.icrs_to_camera)
+        })
+    }
+
+    /// Where a place of the site's sky is in the frame.
+    fn pixel_of(&self, altitude_deg: f64, azimuth_deg: f64) -> Option<PixelPoint> {
+        let Pointing {
+            icrs_to_camera,
+            places,
+        } = self.pointing;
+        let direction = places.in_horizon(azimuth_deg * RAD_PER_DEG, altitude_deg * RAD_PER_DEG)?;
+        let camera = self.simulator.camera();
+        camera.pixel_of(&icrs_to_camera.apply(&direction))
+    }
+
+    /// The sky of a cell; `None` where the frame shows none of it, or the cell is of the frame.
+    pub(super) fn cell(&self, place: &Place) -> Option<TrueCell> {
+        let Place::Horizon {
+            altitude_deg,
+            azimuth_deg,
+        } = place
+        else {
+            return None;
+        };
+        let at = |[from, to]: [f64; 2], step: usize| {
+            from + (to - from) * (step as f64 + 0.5) / SAMPLES as f64
+        };
+        let [
+            mut electrons_per_sr,
+            mut clouds_mag,
+            mut clouded,
+            mut weights,
+        ] = [0.0; 4];
+        for step in 0..SAMPLES * SAMPLES {
+            let altitude_deg = at(*altitude_deg, step / SAMPLES);
+            let pixel = self.pixel_of(altitude_deg, at(*azimuth_deg, step % SAMPLES));
+            let sky = pixel.and_then(|pixel| {
+                Some((
+                    self.sky.electrons_per_sr(&pixel)?,
+                    self.sky.clouds_mag(&pixel),
+                ))
+            });
+            let Some((light, dimmed_mag)) = sky else {
+                continue;
+            };
+            let weight = libm::cos(altitude_deg * RAD_PER_DEG);
+            electrons_per_sr += weight * light;
+            clouds_mag += weight * dimmed_mag;
+            clouded += weight * f64::from(dimmed_mag > CLEAR_MAG);
+            weights += weight;
+        }
+        (weights > 0.0).then(|| TrueCell {
+            mag_arcsec2: self.sky.mag_arcsec2(electrons_per_sr / weights),
+            clouds_mag: clouds_mag / weights,
+            cloud_share: clouded / weights,
+        })
+    }
+
+    /// V magnitudes per square arcsecond of the zenith, as a meter sees it.
+    pub(super) fn zenith_mag_arcsec2(&self) -> f64 {
+        const RING_DEG: f64 = 1.0;
+        const AROUND: usize = 36;
+        let weight =
+            |off_deg: f64| libm::exp(-4.0 * std::f64::consts::LN_2 * (off_deg / METER_DEG).powi(2));
+        let (mut electrons, mut solid_angle_sr) = (0.0, 0.0);
+        for ring in 0..(METER_REACH_DEG / RING_DEG) as usize {
+            let off_deg = (ring as f64 + 0.5) * RING_DEG;
+            let piece_sr =
+                TAU / AROUND as f64 * libm::sin(off_deg * RAD_PER_DEG) * RING_DEG * RAD_PER_DEG;
+            for step in 0..AROUND {
+                let azimuth_deg = step as f64 * 360.0 / AROUND as f64;
+                let pixel = self.pixel_of(90.0 - off_deg, azimuth_deg);
+                if let Some(light) = pixel.and_then(|pixel| self.sky.electrons_per_sr(&pixel)) {
+                    electrons += weight(off_deg) * piece_sr * light;
+                    solid_angle_sr += weight(off_deg) * piece_sr;
+                }
+            }
+        }
+        self.sky.mag_arcsec2(electrons / solid_angle_sr)
+    }
+}
