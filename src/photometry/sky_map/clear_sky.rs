@@ -357,7 +357,9 @@ impl Fit {
             let next_errors = errors_of(&kept, &next);
             let changed_mag = (next_errors.scatter_mag - errors.scatter_mag).abs();
             let is_settled = kept.len() == used && changed_mag < 1e-4;
+            let scale = next.scatter_over_errors(&kept, &next_errors).max(1.0);
             (fit, errors, used) = (next, next_errors, kept.len());
+            fit.covariance *= scale;
             if is_settled {
                 break;
             }
@@ -399,6 +401,16 @@ impl Fit {
             unknowns: root.solve(&right),
             covariance: root.inverse(),
         })
+    }
+
+    /// Mean of the squared residuals of its stars over their variances, for the number of unknowns.
+    fn scatter_over_errors(&self, stars: &[&Candidate], errors: &StarErrors) -> f64 {
+        let square = |star: &&Candidate| {
+            let sigma_mag = errors.of(star.expected_sigma_mag(self));
+            (star.residual_mag(self) / sigma_mag).powi(2)
+        };
+        let sum: f64 = stars.iter().map(square).sum();
+        sum / stars.len().saturating_sub(UNKNOWNS).max(1) as f64
     }
 
     fn variance(&self, row: &SVector<f64, UNKNOWNS>) -> f64 {

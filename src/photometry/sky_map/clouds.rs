@@ -2,7 +2,8 @@
 //!
 //! For the extinction A beyond that of clear air, a star that was measured has the likelihood of its
 //! magnitude, and one that is missing that of not being detected A magnitudes fainter. A part of the sky has
-//! the extinction of clear air alone, and the other part more: which parts is told by all cells together.
+//! the extinction of clear air alone, and the other part more, over all of a cell or over half of it: which
+//! parts is told by all cells together.
 
 use super::grid::CELLS_OF_A_STAR;
 use super::relative_limit::RelativeLimit;
@@ -12,6 +13,13 @@ use crate::base::statistics::Estimate;
 /// Step of the extinctions that are compared, in magnitudes, and their number.
 const STEP_MAG: f64 = 0.05;
 const STEPS: usize = 121;
+/// The same of clouds that cover half of a cell.
+const HALF_STEP_MAG: f64 = 0.1;
+const HALF_STEPS: usize = 60;
+/// Cells that clouds cover by half, for each that they cover.
+const HALVES: f64 = 0.3;
+/// What is compared: clouds over all of a cell, then over half of it.
+const CASES: usize = STEPS + HALF_STEPS;
 /// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
 const MEAN_CLOUD_MAG: f64 = 1.0;
 /// Below this extinction beyond that of clear air, in magnitudes, a sky counts as clear.
@@ -58,7 +66,7 @@ impl Sky<'_> {
         } else {
             RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance)
         };
-        let logs: Vec<[f64; STEPS]> = witnesses
+        let logs: Vec<[f64; CASES]> = witnesses
             .iter()
             .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
             .collect();
@@ -93,11 +101,11 @@ impl Sky<'_> {
     fn evidence<'w>(
         &self,
         cell: usize,
-        stars: impl Iterator<Item = (&'w Witness<'w>, &'w [f64; STEPS])>,
+        stars: impl Iterator<Item = (&'w Witness<'w>, &'w [f64; CASES])>,
         limit: Option<&RelativeLimit>,
         clouds: &mut CellClouds,
     ) -> Option<Evidence> {
-        let mut total = [0.0; STEPS];
+        let mut total = [0.0; CASES];
         let mut told = 0.0;
         for (witness, logs) in stars {
             let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
@@ -119,8 +127,24 @@ impl Sky<'_> {
         (told > LEAST_WEIGHT && self.depths[cell].is_some()).then(|| Evidence::of(&total))
     }
 
-    /// The logarithm of the likelihood of a star for each extinction.
-    fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
+    /// The logarithm of the likelihood of a star in each case.
+    fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; CASES] {
+        let full = self.likelihoods(witness, limit);
+        std::array::from_fn(|case| {
+            let likelihood = match case.checked_sub(STEPS) {
+                None => full[case],
+                // The star is as likely behind the clouds as beside them.
+                Some(step) => {
+                    let behind = half_mag(step) / STEP_MAG;
+                    0.5 * (full[0] + full[behind.round() as usize])
+                }
+            };
+            libm::log(likelihood.max(f64::MIN_POSITIVE))
+        })
+    }
+
+    /// The likelihood of a star for each extinction.
+    fn likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
         let star = witness.star;
         let dimmed_by = self.clear_sky.dimmed_by(star);
         std::array::from_fn(|step| {
@@ -129,7 +153,7 @@ impl Sky<'_> {
                 limit.probability(witness.relative_mag + extinction_mag)
             });
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
-            let likelihood = match (dimmed_by, star.is_detected) {
+            match (dimmed_by, star.is_detected) {
                 (Some(dimmed_by), _) => {
                     let sigma_mag = libm::hypot(dimmed_by.sigma, CLOUD_VARIATION * extinction_mag);
                     let off = (dimmed_by.value - extinction_mag) / sigma_mag;
@@ -138,13 +162,25 @@ impl Sky<'_> {
                 }
                 (None, true) => seen,
                 (None, false) => 1.0 - seen,
-            };
-            libm::log(likelihood.max(f64::MIN_POSITIVE))
+            }
         })
     }
 }
 
-/// What the stars around a cell tell of it: sums over extinctions, if it is part of the clear sky, and if it is
+/// Extinction by clouds that cover half of a cell.
+fn half_mag(step: usize) -> f64 {
+    (step + 1) as f64 * HALF_STEP_MAG
+}
+
+/// Mean extinction of a cell in a case.
+fn mean_mag(case: usize) -> f64 {
+    match case.checked_sub(STEPS) {
+        None => case as f64 * STEP_MAG,
+        Some(step) => 0.5 * half_mag(step),
+    }
+}
+
+/// What the stars around a cell tell of it: sums over the cases, if it is part of the clear sky, and if it is
 /// not.
 #[derive(Debug, Clone, Copy)]
 struct Evidence {
@@ -152,7 +188,7 @@ struct Evidence {
     cloud: Sums,
 }
 
-/// Sums of likelihoods over extinctions.
+/// Sums of likelihoods over the cases.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     all: f64,
@@ -162,24 +198,30 @@ struct Sums {
 }
 
 impl Evidence {
-    /// From the logarithms of the likelihoods of extinctions.
-    fn of(ln_likelihoods: &[f64; STEPS]) -> Self {
+    /// From the logarithms of the likelihoods of the cases.
+    fn of(ln_likelihoods: &[f64; CASES]) -> Self {
         let largest = ln_likelihoods
             .iter()
             .copied()
             .fold(f64::NEG_INFINITY, f64::max);
-        let extinction = |step: usize| step as f64 * STEP_MAG;
-        let of_clear = |step: usize| libm::exp(-0.5 * (extinction(step) / CLEAR_SIGMA_MAG).powi(2));
-        let of_cloud = |step: usize| libm::exp(-extinction(step) / MEAN_CLOUD_MAG);
+        let of_clear = |case: usize| match case {
+            0..STEPS => libm::exp(-0.5 * (mean_mag(case) / CLEAR_SIGMA_MAG).powi(2)),
+            _ => 0.0,
+        };
+        // Most clouds are larger than a cell.
+        let of_cloud = |case: usize| match case.checked_sub(STEPS) {
+            None => STEP_MAG * libm::exp(-mean_mag(case) / MEAN_CLOUD_MAG),
+            Some(step) => HALVES * HALF_STEP_MAG * libm::exp(-half_mag(step) / MEAN_CLOUD_MAG),
+        };
         let sums = |prior: &dyn Fn(usize) -> f64| {
-            let total: f64 = (0..STEPS).map(prior).sum();
+            let total: f64 = (0..CASES).map(prior).sum();
             let mut sums = Sums::default();
-            for (step, ln) in ln_likelihoods.iter().enumerate() {
-                let weight = prior(step) / total * libm::exp(ln - largest);
+            for (case, ln) in ln_likelihoods.iter().enumerate() {
+                let weight = prior(case) / total * libm::exp(ln - largest);
                 sums.all += weight;
-                sums.first += weight * extinction(step);
-                sums.second += weight * extinction(step).powi(2);
-                sums.below_clear += weight * f64::from(extinction(step) < CLEAR_MAG);
+                sums.first += weight * mean_mag(case);
+                sums.second += weight * mean_mag(case).powi(2);
+                sums.below_clear += weight * f64::from(mean_mag(case) < CLEAR_MAG);
             }
             sums
         };
@@ -290,8 +332,8 @@ mod tests {
 
     /// A cell in which extinctions about one are as likely as `odds` to those about zero.
     fn told(cell: usize, odds: f64) -> Told {
-        let logs = std::array::from_fn(|step| {
-            let extinction_mag = step as f64 * STEP_MAG;
+        let logs = std::array::from_fn(|case| {
+            let extinction_mag = mean_mag(case);
             let about = |mag: f64| libm::exp(-0.5 * ((extinction_mag - mag) / 0.1).powi(2));
             libm::log(about(0.0) + odds * about(1.0) + 1e-9)
         });
