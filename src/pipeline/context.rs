@@ -47,6 +47,9 @@ pub struct Context<'a> {
     pub attitude_only: bool,
     /// Whether to measure the sky at each place.
     pub measure_sky: bool,
+    /// Whether to do so without being asked in wide fields whose site and time are known.
+    #[doc(hidden)]
+    pub measure_known_sky: bool,
     /// Whether to search satellites, aeroplanes and meteors.
     pub find_trails: bool,
     /// Which directions reported attitudes refer to.
@@ -80,6 +83,7 @@ impl<'a> Context<'a> {
             calibration: None,
             attitude_only: false,
             measure_sky: false,
+            measure_known_sky: false,
             find_trails: false,
             attitude_frame: AttitudeFrame::default(),
             name_odds: NAME_ODDS,

@@ -258,7 +258,7 @@ fn solve(
     if !context.attitude_only {
         solved.measure_photometry();
         comparison = solved.compare_with_camera();
-        if context.measure_sky {
+        if context.measure_sky || (context.measure_known_sky && solved.shows_whole_sky()) {
             solved.measure_sky(comparison.as_ref());
         }
     }

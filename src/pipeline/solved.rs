@@ -108,6 +108,13 @@ impl SolvedFrame<'_> {
         self.sky = own.or_else(|| measured(Some(usual?)));
     }
 
+    /// Whether the frame is identified, and shows a wide field of a sky whose horizon is known.
+    pub(super) fn shows_whole_sky(&self) -> bool {
+        let found = self.outcome.identification();
+        found
+            .is_some_and(|found| found.places.zenith().is_some() && sky_map::is_wide(&found.camera))
+    }
+
     fn as_held(&self) -> Option<Identification> {
         let size_px = [self.frame.width as f64, self.frame.height as f64];
         let held = self.context.held.as_ref()?;

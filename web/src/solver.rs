@@ -72,6 +72,7 @@ impl Solver {
         let on_stage = |stage: Stage| progress(stage_name(stage), 1.0);
         let camera = equipment.camera.clone();
         let mut context = Context::new(&self.indexed).with_options(&options, camera);
+        context.measure_known_sky = true;
         context.calibration = equipment.calibration.as_ref();
         context.on_stage = Some(&on_stage);
         let path = Path::new(name);

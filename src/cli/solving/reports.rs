@@ -65,10 +65,12 @@ pub(crate) fn report_all(
     let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
         catalog.with_index(|pool, indexed| {
+            let mut context = plan.context(indexed);
+            context.measure_known_sky = true;
             let solver = Solver {
                 pool,
                 inputs,
-                context: plan.context(indexed),
+                context,
                 memory: plan.memory,
                 sink: Reports {
                     files,

@@ -50,6 +50,12 @@ struct Horizon {
     east: UnitVector<Icrs>,
 }
 
+/// Whether a field is divided by altitude, where the horizon is known.
+#[doc(hidden)]
+pub fn is_wide(camera: &CameraModel) -> bool {
+    camera.radius_rad() > WIDE_RAD
+}
+
 /// The parts into which the sky above the horizon is divided, from the horizon up.
 pub fn horizon_places() -> Vec<Place> {
     let ring = |ring: usize| {
@@ -81,8 +87,7 @@ impl<'a> Grid<'a> {
     /// The parts of the sky over `frame`.
     pub(super) fn over(frame: &IdentifiedFrame<'a>) -> Self {
         let found = frame.identification;
-        let is_wide = found.camera.radius_rad() > WIDE_RAD;
-        match Horizon::of(&frame.places).filter(|_| is_wide) {
+        match Horizon::of(&frame.places).filter(|_| is_wide(&found.camera)) {
             Some(horizon) => Self::of_horizon(found, horizon, &frame.places),
             None => Self::of_frame(found),
         }

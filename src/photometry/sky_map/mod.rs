@@ -34,7 +34,7 @@ pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
 pub use grid::Place;
 #[doc(hidden)]
-pub use grid::horizon_places;
+pub use grid::{horizon_places, is_wide};
 #[doc(hidden)]
 pub use limits::StatedLimit;
 #[doc(hidden)]

@@ -1,6 +1,5 @@
 //! What a frame is taken of, and how the camera is set: drawn at random.
 
-use super::SkyStudy;
 use crate::base::coords::Rotation;
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
@@ -11,7 +10,7 @@ use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
 use crate::sky::solar_system::moon_and_sun;
 use crate::study::validation::ValidationError;
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// Modified Julian Dates of 2020-01-01 and 2030-01-01.
@@ -100,17 +99,18 @@ pub struct Moon {
 }
 
 impl Conditions {
-    /// Those of the frame with this number.
+    /// Those of a frame of this camera; `site` is where it is taken.
     ///
     /// # Errors
     /// [`ValidationError`] if the camera cannot be simulated.
-    pub(super) fn draw(study: &SkyStudy, number: u64) -> Result<Self, ValidationError> {
-        let mut random = ChaCha8Rng::seed_from_u64(study.seed);
-        random.set_stream(number);
-        let random = &mut random;
-        let camera = &study.setup.scenario.camera;
+    pub(super) fn draw(
+        setup: &Setup,
+        site: Site,
+        random: &mut ChaCha8Rng,
+    ) -> Result<Self, ValidationError> {
+        let camera = &setup.scenario.camera;
         let sky_px = 2.0 * camera_of(camera).field_radius_px();
-        let (date, almanac) = dark_hour(random, study.site);
+        let (date, almanac) = dark_hour(random, site);
         let clouds = if random.random_ratio(CLOUDY_OF_THREE, 3) {
             Clouds {
                 mag: one_of(&CLOUDS_MAG, random),
@@ -138,7 +138,7 @@ impl Conditions {
                 illuminated: almanac.moon_illuminated,
             },
         };
-        drawn.set_camera(study, random)?;
+        drawn.set_camera(setup, site, random)?;
         Ok(drawn)
     }
 
@@ -146,13 +146,14 @@ impl Conditions {
     /// fill the wells.
     fn set_camera(
         &mut self,
-        study: &SkyStudy,
+        setup: &Setup,
+        site: Site,
         random: &mut ChaCha8Rng,
     ) -> Result<(), ValidationError> {
         let level = evenly_in_ratio(LEVELS, random);
         let bias = between(BIASES, random);
-        let well_e = study.setup.scenario.camera.full_well_e;
-        let sky_e = sky_e(&self.applied_to(&study.setup, study.site))? * (1.0 + self.clouds.light);
+        let well_e = setup.scenario.camera.full_well_e;
+        let sky_e = sky_e(&self.applied_to(setup, site))? * (1.0 + self.clouds.light);
         let part = (MOST_OF_WELL * well_e / sky_e).min(1.0);
         self.exposure_s *= part;
         let full_adu = f64::from(2u32.pow(self.bits) - 1);

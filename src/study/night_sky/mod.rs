@@ -29,6 +29,8 @@ use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::{Context, Workspace, solve_frame};
 use crate::sky::observer::Site;
 use crate::study::validation::ValidationError;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use truth::Truth;
 
 /// Simulates and measures skies over one camera.
@@ -54,7 +56,9 @@ impl SkyStudy<'_> {
         number: u64,
         workspace: &mut Workspace,
     ) -> Result<SkyTrial, ValidationError> {
-        let conditions = Conditions::draw(self, number)?;
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(number);
+        let conditions = Conditions::draw(&self.setup, self.site, &mut random)?;
         let setup = conditions.applied_to(&self.setup, self.site);
         setup.check()?;
         let stars = self.indexed.catalog().stars();

@@ -97,6 +97,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "model",
             "photometry",
             "pipeline",
+            "night",
         ],
     ),
 ];
