@@ -426,6 +426,8 @@ impl Fit {
     ) -> ClearSky {
         /// Part of what experience leaves open that a measured extinction leaves.
         const MEASURED: f64 = 0.5;
+        /// Largest scatter of stars in clear air, where gray levels are proportional to light.
+        const CLEAR_SCATTER_MAG: f64 = 0.12;
         let estimate = |unknown: usize| Estimate {
             value: self.unknowns[unknown],
             sigma: self.covariance[(unknown, unknown)].max(0.0).sqrt(),
@@ -433,6 +435,10 @@ impl Fit {
         let edge = SVector::from(row_of(None, 1.0, None, 0.0))
             - SVector::from(row_of(None, 0.0, None, 0.0));
         let extinction_mag = estimate(EXTINCTION);
+        let of_sky = SVector::from(row_of(None, 0.0, Some(SKY_BV_MAG.value), 0.0));
+        // Stars that scatter more may be behind thin clouds, all of them.
+        let doubt_mag = Some(errors.scatter_mag).filter(|scatter| *scatter > CLEAR_SCATTER_MAG);
+        let doubt_mag = doubt_mag.unwrap_or(0.0);
         ClearSky {
             zero_point_vmag: estimate(0),
             extinction_mag,
@@ -449,14 +455,7 @@ impl Fit {
             errors,
             mean_vmag,
             unknowns: self.unknowns.into(),
-            sky_sigma_mag: self
-                .variance(&SVector::from(row_of(
-                    None,
-                    0.0,
-                    Some(SKY_BV_MAG.value),
-                    0.0,
-                )))
-                .sqrt(),
+            sky_sigma_mag: libm::hypot(self.variance(&of_sky).sqrt(), doubt_mag),
         }
     }
 }
