@@ -4,6 +4,7 @@
 use crate::common::{Ran, names, number, starpipe};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde_json::json;
 use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -385,6 +386,64 @@ fn the_focal_length_is_right_for_every_lens_of_the_hard_suite() {
     // A second run reads the existing results.
     let again = run();
     assert_eq!((again.status, again.stdout), (0, ran.stdout));
+}
+
+#[test]
+fn skies_are_compared_with_the_truth_and_a_stopped_run_goes_on() {
+    let directory = tempfile::tempdir().unwrap();
+    let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/start/all-sky.toml");
+    let run = |name: &str, count: &str, threads: &str| {
+        let out = directory.path().join(name);
+        let out = out.to_str().unwrap();
+        let options = [
+            "validate",
+            "--suite",
+            "sky",
+            "--camera",
+            camera,
+            "--seed",
+            "2",
+            "--figures",
+            "none",
+            "--format",
+            "json",
+        ];
+        let more = ["--count", count, "--out", out];
+        let ran = Ran::new(
+            starpipe()
+                .env("RAYON_NUM_THREADS", threads)
+                .args([&options[..], &more].concat()),
+        );
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        ran
+    };
+    let whole = run("whole", "5", "2");
+    // The last row is cut off, as by a stop while it was written.
+    run("stopped", "3", "1");
+    let rows = directory.path().join("stopped/frames.jsonl");
+    let text = fs::read(&rows).unwrap();
+    fs::write(&rows, &text[..text.len() - 100]).unwrap();
+    let continued = run("stopped", "5", "1");
+    assert_eq!(continued.stdout, whole.stdout);
+    for file in [
+        "frames.csv",
+        "cells.csv",
+        "suite.json",
+        "suite.csv",
+        "suite.txt",
+    ] {
+        let read = |name: &str| fs::read(directory.path().join(name).join(file)).unwrap();
+        assert_eq!(read("whole"), read("stopped"), "{file}");
+    }
+    let all = &whole.reports()[0]["groups"][0];
+    assert_eq!(
+        (&all["group"], &all["frames"], &all["wrong"]),
+        (&json!("all"), &json!(5), &json!(0))
+    );
+    let measured = all["measured"].as_u64().unwrap();
+    assert!(measured >= 3, "{all}");
+    let zenith_mag = all["zenith_mean_mag"].as_f64().unwrap();
+    assert!(zenith_mag.abs() < 0.1, "{all}");
 }
 
 #[test]

@@ -101,8 +101,8 @@ impl Panel {
             .configure_mesh()
             .x_desc(&self.x.title)
             .y_desc(&self.y.title)
-            .x_label_formatter(&|value| five_digits(*value))
-            .y_label_formatter(&|value| five_digits(*value))
+            .x_label_formatter(&|value| tick(*value))
+            .y_label_formatter(&|value| tick(*value))
             .x_labels(8)
             .y_labels(8)
             .label_style((FONT, LETTERS_PX))
@@ -119,6 +119,12 @@ impl Panel {
         }
         Ok(())
     }
+}
+
+/// The number at a line of an axis. The one at 0 is off by what rounding leaves.
+fn tick(value: f64) -> String {
+    const ROUNDING: f64 = 1e-12;
+    five_digits(if value.abs() < ROUNDING { 0.0 } else { value })
 }
 
 /// Draws a bar of colors from bottom to top, with numbers beside it and its title above.

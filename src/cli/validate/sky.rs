@@ -116,7 +116,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         y: Axis::of(y),
         layers: vec![
             Layer::guide(Marks::Levels(vec![0.0])),
-            Layer::new("frames, with stated errors", BLUE, marks),
+            Layer::new("frames", BLUE, marks),
         ],
     };
     let zenith = dots(|row| {

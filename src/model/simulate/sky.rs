@@ -484,6 +484,37 @@ mod tests {
     }
 
     #[test]
+    fn the_light_at_a_place_is_that_of_the_pixel_there() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let camera = camera();
+        let scene = Scene {
+            by_altitude: 1.0,
+            moon_distance_deg: Some(25.0),
+            cloud_mag: 1.0,
+            cloud_light: 1.0,
+            cloud_share: Some(0.7),
+            sky_gradient: 0.3,
+            ..Scene::default()
+        };
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let sky = Sky::new(&scenario, &scene, &camera, &mut random);
+        let mut image = ElectronImage::new(400, 300, 0.0);
+        sky.expose(&mut image, 100.0);
+        let mut clouded = 0;
+        for i in (0..120_000).step_by(97) {
+            let place = PixelPoint::new((i % 400) as f64, (i / 400) as f64);
+            let expected = 100.0 * sky.light(&place).unwrap() * sky.lens(&place);
+            let found = image.pixels()[i];
+            assert!(
+                (found / expected - 1.0).abs() < 0.01,
+                "{place:?}: {found}, {expected}"
+            );
+            clouded += usize::from(sky.clouds_mag(&place) > 0.0);
+        }
+        assert!(clouded > 700, "{clouded}");
+    }
+
+    #[test]
     fn small_clouds_light_the_sky_where_they_dim_the_stars() {
         let scenario = Scenario::of(Preset::NanosatTracker);
         let camera = camera();
