@@ -103,8 +103,8 @@ pub(crate) struct FilterPass {
     pub matched_gain: f64,
     /// The threshold, in standard deviations of the filtered noise.
     pub threshold: f64,
-    /// The median level that it is over the frame, in standard deviations of filtered white noise:
-    /// the light of faint stars raises both mean and noise of the filtered frame.
+    /// The median of it over the frame, in standard deviations of filtered white noise: the light of faint
+    /// stars raises the noise of the filtered frame. It is above the frame's local mean, and so are stars.
     pub threshold_level: f64,
     /// Why the threshold holds less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
