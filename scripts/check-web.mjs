@@ -473,6 +473,17 @@ async function useModels() {
   const ours = JSON.parse(await page.locator("#limit-json").textContent());
   const options = ["--preset", "imx174-35mm", "--exposure", "0.5", "--sky-mag-arcsec2", "20"];
   const limits = compare("limit", ours, JSON.parse(programJson(["limit", "--format", "json", ...options])));
+  for (const link of await page.locator("#limit-paper a").all()) {
+    const before = await page.locator("#limit-json").textContent();
+    const preset = new URLSearchParams((await link.getAttribute("href")).split("?")[1]).get("preset");
+    await link.click();
+    await page.waitForFunction((before) => {
+      const now = document.querySelector("#limit-json").textContent;
+      return now !== before && now.includes("mean_vmag");
+    }, before, { timeout: SOLVE_MS });
+    const linked = JSON.parse(await page.locator("#limit-json").textContent());
+    compare(`limit of ${preset}`, linked, JSON.parse(programJson(["limit", "--format", "json", "--preset", preset])));
+  }
   console.log(`limit: ${limits}`);
   await page.waitForSelector("#limit-figures svg >> nth=1", { timeout: SOLVE_MS });
   await shot(page, "limit-desktop");
