@@ -18,7 +18,10 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-MOST = 3
+MOST = 20
+# Of commands that simulate and process each.
+MOST_OF_STUDIES = 3
+STUDIES = ("clutter", "robustness", "validate")
 
 
 def commands(page):
@@ -35,10 +38,11 @@ def commands(page):
 
 
 def shortened(command):
-    """The command with at most `MOST` frames or trials."""
-    fewer = lambda found: f"{found[1]} {min(MOST, int(found[2]))}"
+    """The command with few frames or trials."""
+    most = MOST_OF_STUDIES if command.split()[1] in STUDIES else MOST
+    fewer = lambda found: f"{found[1]} {min(most, int(found[2]))}"
     command = re.sub(r"(--count) (\d+)", fewer, command)
-    return command + f" --count {MOST}" if command == "starpipe robustness" else command
+    return command + f" --count {most}" if command == "starpipe robustness" else command
 
 
 def run(page, program):
