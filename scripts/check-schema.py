@@ -82,6 +82,7 @@ validate: validate --camera {CAMERA} --count 2 --figures none --out OUT/validati
 validate: validate --camera {CAMERA} --count 1 --exposure 0.0005 --figures none --out OUT/nothing
 validate_sweep: validate --camera {CAMERA} --count 1 --sweep exposure_s=0.0005:0.1:2 --figures none --out OUT/study
 validate_suite: validate --camera {CAMERA} --count 1 --width-px 400 --height-px 400 --suite hard --figures none --out OUT/suite
+validate_skies: validate --camera docs/start/all-sky.toml --count 2 --seed 2 --suite sky --figures none --out OUT/skies
 defocus: defocus --camera {CAMERA} --darks OUT/short --vmag 5 --count 20 --radius-px 0.2:1.6:5 --noise-e 3:27:2 --required-error 0.05,0.0001
 defocus: defocus --normalisation peak --count 20 --radius-px 0.4:2.4:20 --required-error 0.02
 None: process OUT/night/*.tif fixtures/regression/no-stars.tif fixtures/regression/wide.toml --out-parquet OUT/archive
