@@ -467,12 +467,8 @@ async function useLimits(page) {
   console.log(`limit: of ${RANDOM_SETTINGS} random settings, ${same} the same in every digit, ${refused} refused by both`);
 }
 
-async function useModels() {
-  const page = await open({ width: 1280, height: 900 }, "light", "#limit?preset=imx174-35mm&exposure_s=0.5&sky_mag_arcsec2=20");
-  await page.waitForFunction(() => document.querySelector("#limit-json").textContent.includes("mean_vmag"), null, { timeout: SOLVE_MS });
-  const ours = JSON.parse(await page.locator("#limit-json").textContent());
-  const options = ["--preset", "imx174-35mm", "--exposure", "0.5", "--sky-mag-arcsec2", "20"];
-  const limits = compare("limit", ours, JSON.parse(programJson(["limit", "--format", "json", ...options])));
+/** The paper's experiments by their links. */
+async function useLinks(page) {
   for (const link of await page.locator("#limit-paper a").all()) {
     const before = await page.locator("#limit-json").textContent();
     const preset = new URLSearchParams((await link.getAttribute("href")).split("?")[1]).get("preset");
@@ -484,6 +480,14 @@ async function useModels() {
     const linked = JSON.parse(await page.locator("#limit-json").textContent());
     compare(`limit of ${preset}`, linked, JSON.parse(programJson(["limit", "--format", "json", "--preset", preset])));
   }
+}
+
+async function useModels() {
+  const page = await open({ width: 1280, height: 900 }, "light", "#limit?preset=imx174-35mm&exposure_s=0.5&sky_mag_arcsec2=20");
+  await page.waitForFunction(() => document.querySelector("#limit-json").textContent.includes("mean_vmag"), null, { timeout: SOLVE_MS });
+  const ours = JSON.parse(await page.locator("#limit-json").textContent());
+  const options = ["--preset", "imx174-35mm", "--exposure", "0.5", "--sky-mag-arcsec2", "20"];
+  const limits = compare("limit", ours, JSON.parse(programJson(["limit", "--format", "json", ...options])));
   console.log(`limit: ${limits}`);
   await page.waitForSelector("#limit-figures svg >> nth=1", { timeout: SOLVE_MS });
   await shot(page, "limit-desktop");
@@ -496,6 +500,7 @@ async function useModels() {
   await page.keyboard.press("PageUp");
   await page.waitForFunction((before) => document.querySelector("#limit-answer").textContent !== before, before, { timeout: SOLVE_MS });
   check(page.url().includes("aperture_mm="), "the link does not carry the aperture");
+  await useLinks(page);
 
   await page.locator("#tab-defocus").click();
   await page.waitForSelector("#defocus-preset option", { state: "attached", timeout: SOLVE_MS });
