@@ -36,19 +36,22 @@ impl Light {
         let disc_e = (1.0 - HALO) * self.electrons / (PI * radius_px * radius_px);
         for (y, row) in image.rows_mut() {
             for (x, pixel) in row.iter_mut().enumerate() {
-                let place = PixelPoint::new(x as f64, y as f64);
+                let r_px = self.place.distance_to(&PixelPoint::new(x as f64, y as f64));
                 // The disc's edge is a pixel wide.
-                let disc = (radius_px + 0.5 - self.place.distance_to(&place)).clamp(0.0, 1.0);
-                *pixel += disc_e * disc + self.halo_e(&place);
+                let disc = (radius_px + 0.5 - r_px).clamp(0.0, 1.0);
+                *pixel += disc_e * disc + self.halo_e(r_px);
             }
         }
     }
 
-    /// Electrons of the halo in a pixel.
-    pub(super) fn halo_e(&self, place: &PixelPoint) -> f64 {
+    /// Electrons of the halo in the pixel at `place`.
+    pub(super) fn halo_at(&self, place: &PixelPoint) -> f64 {
+        self.halo_e(self.place.distance_to(place))
+    }
+
+    fn halo_e(&self, r_px: f64) -> f64 {
         let radius_px = self.radius_px.max(1.0);
         let center_e = HALO * self.electrons * (HALO_BETA - 1.0) / (PI * radius_px * radius_px);
-        let r_px = self.place.distance_to(place);
         center_e * libm::pow(1.0 + (r_px / radius_px).powi(2), -HALO_BETA)
     }
 }

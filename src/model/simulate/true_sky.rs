@@ -25,7 +25,7 @@ impl TrueSky<'_> {
     /// Electrons of a steradian at `place`, in front of a lens without vignetting, with the halos of bright
     /// lights and without stars; `None` where the lens images nothing.
     pub fn electrons_per_sr(&self, place: &PixelPoint) -> Option<f64> {
-        let halos_e: f64 = self.lights.iter().map(|light| light.halo_e(place)).sum();
+        let halos_e: f64 = self.lights.iter().map(|light| light.halo_at(place)).sum();
         let light_e = self.sky_e * self.sky.light(place)? + halos_e / self.sky.lens(place);
         Some(light_e / solid_angle_sr(self.camera, place)?)
     }

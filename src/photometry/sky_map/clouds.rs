@@ -72,18 +72,16 @@ impl Sky<'_> {
             .collect();
         let mut cells = vec![CellClouds::default(); self.grid.places.len()];
         let mut told = Vec::new();
+        let priors = Priors::new();
         for (cell, (clouds, solid_angle_sr)) in cells.iter_mut().zip(solid_angles_sr).enumerate() {
             let stars = witnesses.iter().zip(&logs);
-            let evidence = self.evidence(cell, stars, limit.as_ref(), clouds);
-            told.extend(
-                evidence
-                    .filter(|_| *solid_angle_sr > 0.0)
-                    .map(|evidence| Told {
-                        cell,
-                        solid_angle_sr: *solid_angle_sr,
-                        evidence,
-                    }),
-            );
+            let logs = self.ln_likelihoods_around(cell, stars, limit.as_ref(), clouds);
+            let logs = logs.filter(|_| *solid_angle_sr > 0.0);
+            told.extend(logs.map(|logs| Told {
+                cell,
+                solid_angle_sr: *solid_angle_sr,
+                evidence: Evidence::of(&logs, &priors),
+            }));
         }
         let cover = Cover::of(&told);
         for Told { cell, evidence, .. } in &told {
@@ -97,14 +95,15 @@ impl Sky<'_> {
         }
     }
 
-    /// What the stars around a cell tell, if they do; the stars in it are counted in `clouds`.
-    fn evidence<'w>(
+    /// The logarithms of the likelihoods of the stars around a cell, if they tell of it; the stars in it are counted
+    /// in `clouds`.
+    fn ln_likelihoods_around<'w>(
         &self,
         cell: usize,
         stars: impl Iterator<Item = (&'w Witness<'w>, &'w [f64; CASES])>,
         limit: Option<&RelativeLimit>,
         clouds: &mut CellClouds,
-    ) -> Option<Evidence> {
+    ) -> Option<[f64; CASES]> {
         let mut total = [0.0; CASES];
         let mut told = 0.0;
         for (witness, logs) in stars {
@@ -124,7 +123,7 @@ impl Sky<'_> {
                 clouds.detected += usize::from(witness.star.is_detected);
             }
         }
-        (told > LEAST_WEIGHT && self.depths[cell].is_some()).then(|| Evidence::of(&total))
+        (told > LEAST_WEIGHT && self.depths[cell].is_some()).then_some(total)
     }
 
     /// The logarithm of the likelihood of a star in each case.
@@ -180,6 +179,34 @@ fn mean_mag(case: usize) -> f64 {
     }
 }
 
+/// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
+struct Priors {
+    clear: [f64; CASES],
+    cloud: [f64; CASES],
+}
+
+impl Priors {
+    fn new() -> Self {
+        let of_clear = |case: usize| match case {
+            0..STEPS => libm::exp(-0.5 * (mean_mag(case) / CLEAR_SIGMA_MAG).powi(2)),
+            _ => 0.0,
+        };
+        // Most clouds are larger than a cell.
+        let of_cloud = |case: usize| match case.checked_sub(STEPS) {
+            None => STEP_MAG * libm::exp(-mean_mag(case) / MEAN_CLOUD_MAG),
+            Some(step) => HALVES * HALF_STEP_MAG * libm::exp(-half_mag(step) / MEAN_CLOUD_MAG),
+        };
+        let normalized = |prior: &dyn Fn(usize) -> f64| {
+            let total: f64 = (0..CASES).map(prior).sum();
+            std::array::from_fn(|case| prior(case) / total)
+        };
+        Self {
+            clear: normalized(&of_clear),
+            cloud: normalized(&of_cloud),
+        }
+    }
+}
+
 /// What the stars around a cell tell of it: sums over the cases, if it is part of the clear sky, and if it is
 /// not.
 #[derive(Debug, Clone, Copy)]
@@ -199,25 +226,15 @@ struct Sums {
 
 impl Evidence {
     /// From the logarithms of the likelihoods of the cases.
-    fn of(ln_likelihoods: &[f64; CASES]) -> Self {
+    fn of(ln_likelihoods: &[f64; CASES], priors: &Priors) -> Self {
         let largest = ln_likelihoods
             .iter()
             .copied()
             .fold(f64::NEG_INFINITY, f64::max);
-        let of_clear = |case: usize| match case {
-            0..STEPS => libm::exp(-0.5 * (mean_mag(case) / CLEAR_SIGMA_MAG).powi(2)),
-            _ => 0.0,
-        };
-        // Most clouds are larger than a cell.
-        let of_cloud = |case: usize| match case.checked_sub(STEPS) {
-            None => STEP_MAG * libm::exp(-mean_mag(case) / MEAN_CLOUD_MAG),
-            Some(step) => HALVES * HALF_STEP_MAG * libm::exp(-half_mag(step) / MEAN_CLOUD_MAG),
-        };
-        let sums = |prior: &dyn Fn(usize) -> f64| {
-            let total: f64 = (0..CASES).map(prior).sum();
+        let sums = |prior: &[f64; CASES]| {
             let mut sums = Sums::default();
-            for (case, ln) in ln_likelihoods.iter().enumerate() {
-                let weight = prior(case) / total * libm::exp(ln - largest);
+            for (case, (ln, prior)) in ln_likelihoods.iter().zip(prior).enumerate() {
+                let weight = prior * libm::exp(ln - largest);
                 sums.all += weight;
                 sums.first += weight * mean_mag(case);
                 sums.second += weight * mean_mag(case).powi(2);
@@ -226,8 +243,8 @@ impl Evidence {
             sums
         };
         let mut evidence = Self {
-            clear: sums(&of_clear),
-            cloud: sums(&of_cloud),
+            clear: sums(&priors.clear),
+            cloud: sums(&priors.cloud),
         };
         evidence.clear = evidence.clear.at_least(evidence.cloud.all / MOST_ODDS);
         evidence.cloud = evidence.cloud.at_least(evidence.clear.all / MOST_ODDS);
@@ -340,7 +357,7 @@ mod tests {
         Told {
             cell,
             solid_angle_sr: 0.01,
-            evidence: Evidence::of(&logs),
+            evidence: Evidence::of(&logs, &Priors::new()),
         }
     }
 
