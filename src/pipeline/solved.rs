@@ -20,6 +20,7 @@ use crate::photometry::sky_map::{self, Picture, SkyMap, StatedLimit};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
+use crate::sky::solar_system::moon_and_sun;
 use std::collections::HashSet;
 
 /// What the stages found in a frame.
@@ -86,6 +87,10 @@ impl SolvedFrame<'_> {
             frame: self.frame,
             dark_adu: if has_dark { Some(0.0) } else { by_camera },
             is_flat: has_flat || camera.is_some(),
+            moon: self.priors.date.map(|known| {
+                let (moon, _) = moon_and_sun(&known.date, self.priors.site);
+                moon.direction
+            }),
         };
         let frame = self.identified_frame(identification);
         let stated = comparison.map(|comparison| StatedLimit {

@@ -187,6 +187,16 @@ impl Levels {
         levels
     }
 
+    /// Light of a cell over its solid angle, in ADU per steradian.
+    pub(super) fn radiance_adu_sr(&self, cell: usize) -> Option<f64> {
+        let Sum {
+            light_adu,
+            solid_angle_sr,
+        } = self.cells[cell].light;
+        let radiance = light_adu / solid_angle_sr;
+        (radiance.is_finite() && radiance > 0.0).then_some(radiance)
+    }
+
     /// The brightness of a cell; `None` where it has no light.
     pub(super) fn light(&self, cell: usize, clear_sky: &ClearSky) -> Option<SkyLight> {
         self.cells[cell]

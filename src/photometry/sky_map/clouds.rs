@@ -3,8 +3,11 @@
 //! For the extinction A beyond that of clear air, a star that was measured has the likelihood of its
 //! magnitude, and one that is missing that of not being detected A magnitudes fainter. A part of the sky has
 //! the extinction of clear air alone, and the other part more, over all of a cell or over half of it: which
-//! parts is told by all cells together.
+//! parts is told by all cells together. Where clouds are brighter or darker than a clear sky, so does their
+//! light (`cloud_light`).
 
+use super::brightness::Levels;
+use super::cloud_light::{CloudLight, Hidden, LitCell, terms};
 use super::grid::CELLS_OF_A_STAR;
 use super::relative_limit::RelativeLimit;
 use super::witnesses::{Sky, Witness};
@@ -59,8 +62,8 @@ pub(super) struct Clouds {
 }
 
 impl Sky<'_> {
-    /// Clouds in each cell; `solid_angles_sr` are those of their sky in the frame.
-    pub(super) fn clouds(&self, witnesses: &[Witness], solid_angles_sr: &[f64]) -> Clouds {
+    /// Clouds in each cell.
+    pub(super) fn clouds(&self, witnesses: &[Witness], levels: &Levels) -> Clouds {
         let limit = if self.is_usual {
             Some(RelativeLimit::usual())
         } else {
@@ -73,17 +76,29 @@ impl Sky<'_> {
         let mut cells = vec![CellClouds::default(); self.grid.places.len()];
         let mut told = Vec::new();
         let priors = Priors::new();
-        for (cell, (clouds, solid_angle_sr)) in cells.iter_mut().zip(solid_angles_sr).enumerate() {
+        for (cell, (clouds, level)) in cells.iter_mut().zip(&levels.cells).enumerate() {
+            let solid_angle_sr = level.solid_angle_sr;
             let stars = witnesses.iter().zip(&logs);
             let logs = self.ln_likelihoods_around(cell, stars, limit.as_ref(), clouds);
-            let logs = logs.filter(|_| *solid_angle_sr > 0.0);
+            let logs = logs.filter(|_| solid_angle_sr > 0.0);
             told.extend(logs.map(|logs| Told {
                 cell,
-                solid_angle_sr: *solid_angle_sr,
+                solid_angle_sr,
                 evidence: Evidence::of(&logs, &priors),
+                ln_likelihoods: logs,
             }));
         }
-        let cover = Cover::of(&told);
+        let mut cover = Cover::of(&told);
+        let lit = told
+            .iter()
+            .filter_map(|told| self.lit(told, levels, &priors));
+        let before = priors.hidden(&[0.0; CASES]);
+        if let Some(light) = CloudLight::of(lit.collect(), &before, cover.clouded) {
+            for told in &mut told {
+                told.add(&light, &priors);
+            }
+            cover = Cover::of(&told);
+        }
         for Told { cell, evidence, .. } in &told {
             let (clear, extinction_mag) = evidence.posterior(cover.clouded);
             cells[*cell].clear = Some(clear);
@@ -124,6 +139,19 @@ impl Sky<'_> {
             }
         }
         (told > LEAST_WEIGHT && self.depths[cell].is_some()).then_some(total)
+    }
+
+    /// A cell with its light.
+    fn lit(&self, told: &Told, levels: &Levels, priors: &Priors) -> Option<LitCell> {
+        let place = self.grid.pixel_of(told.cell)?;
+        let direction = self.grid.direction_of(&place)?;
+        let (camera, zenith) = (self.grid.camera(), self.places.zenith());
+        Some(LitCell {
+            cell: told.cell,
+            hidden: priors.hidden(&told.ln_likelihoods),
+            light: levels.radiance_adu_sr(told.cell)?,
+            terms: terms(camera, &place, &direction, zenith, self.moon.as_ref()),
+        })
     }
 
     /// The logarithm of the likelihood of a star in each case.
@@ -179,10 +207,29 @@ fn mean_mag(case: usize) -> f64 {
     }
 }
 
+/// The largest of the logarithms.
+fn largest_of(ln_likelihoods: &[f64; CASES]) -> f64 {
+    ln_likelihoods
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Mean share of a star's light that clouds take in a case.
+fn hidden_share(case: usize) -> f64 {
+    let of = |mag: f64| 1.0 - libm::pow(10.0, -0.4 * mag);
+    match case.checked_sub(STEPS) {
+        None => of(case as f64 * STEP_MAG),
+        Some(step) => 0.5 * of(half_mag(step)),
+    }
+}
+
 /// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
 struct Priors {
     clear: [f64; CASES],
     cloud: [f64; CASES],
+    /// Mean share of a star's light that clouds take in each case.
+    hidden_shares: [f64; CASES],
 }
 
 impl Priors {
@@ -203,7 +250,20 @@ impl Priors {
         Self {
             clear: normalized(&of_clear),
             cloud: normalized(&of_cloud),
+            hidden_shares: std::array::from_fn(hidden_share),
         }
+    }
+
+    /// The share of a star's light that clouds take, by the logarithms of the likelihoods of the cases.
+    fn hidden(&self, ln_likelihoods: &[f64; CASES]) -> Hidden {
+        let largest = largest_of(ln_likelihoods);
+        let mut hidden = Hidden::NONE;
+        for (case, ln) in ln_likelihoods.iter().enumerate() {
+            let likelihood = libm::exp(ln - largest);
+            let [clear, cloud] = [&self.clear, &self.cloud].map(|prior| prior[case] * likelihood);
+            hidden.add(self.hidden_shares[case], clear, cloud);
+        }
+        hidden
     }
 }
 
@@ -227,10 +287,7 @@ struct Sums {
 impl Evidence {
     /// From the logarithms of the likelihoods of the cases.
     fn of(ln_likelihoods: &[f64; CASES], priors: &Priors) -> Self {
-        let largest = ln_likelihoods
-            .iter()
-            .copied()
-            .fold(f64::NEG_INFINITY, f64::max);
+        let largest = largest_of(ln_likelihoods);
         let sums = |prior: &[f64; CASES]| {
             let mut sums = Sums::default();
             for (case, (ln, prior)) in ln_likelihoods.iter().zip(prior).enumerate() {
@@ -287,7 +344,18 @@ impl Sums {
 struct Told {
     cell: usize,
     solid_angle_sr: f64,
+    ln_likelihoods: [f64; CASES],
     evidence: Evidence,
+}
+
+impl Told {
+    /// Adds what its light tells.
+    fn add(&mut self, light: &CloudLight, priors: &Priors) {
+        for (case, ln_likelihood) in self.ln_likelihoods.iter_mut().enumerate() {
+            *ln_likelihood += libm::log(light.likelihood(self.cell, priors.hidden_shares[case]));
+        }
+        self.evidence = Evidence::of(&self.ln_likelihoods, priors);
+    }
 }
 
 /// How much of the sky is not part of the clear one: the share for which what the cells show is most probable.
@@ -358,6 +426,7 @@ mod tests {
             cell,
             solid_angle_sr: 0.01,
             evidence: Evidence::of(&logs, &Priors::new()),
+            ln_likelihoods: logs,
         }
     }
 

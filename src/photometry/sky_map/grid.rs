@@ -187,6 +187,13 @@ impl<'a> Grid<'a> {
         Some(before + ((turn * count as f64) as usize).min(count - 1))
     }
 
+    /// Where the centre of a cell is in the frame.
+    pub(super) fn pixel_of(&self, cell: usize) -> Option<PixelPoint> {
+        let direction = self.centers[cell]?;
+        let in_camera = self.found.icrs_to_camera.apply(&direction);
+        self.camera().pixel_of(&in_camera)
+    }
+
     /// Whether a direction is so near a cell's centre, in reaches of a cell.
     pub(super) fn is_near(&self, cell: usize, direction: &UnitVector<Icrs>, reaches: f64) -> bool {
         let reach_rad = reaches * REACH * self.breadth_rad;

@@ -8,7 +8,8 @@
 //! 2. The stars that are not dimmed give the clear sky (`clear_sky`): the zero point outside the
 //!    atmosphere, and the extinction per airmass.
 //! 3. In each cell, the stars that are dimmed or missing give the extinction beyond it, and the
-//!    probability that it is hardly any (`clouds`).
+//!    probability that it is hardly any (`clouds`); so does the light of clouds, where it goes with missing
+//!    stars (`cloud_light`).
 //! 4. The background above the bias, over the solid angle of a pixel, is the sky's brightness
 //!    (`brightness`).
 //! 5. The threshold and the extinction of a cell tell how faint its stars should go, and the stars around it
@@ -20,6 +21,7 @@
 
 mod brightness;
 mod clear_sky;
+mod cloud_light;
 mod clouds;
 mod depth;
 mod grid;
@@ -119,21 +121,17 @@ pub fn measure(
         clear_sky: &clear_sky,
         depths: &depths,
         places: frame.places,
+        moon: picture.moon,
         detections: frame.detections,
         exposure_s: levels.exposure_s,
         chance: association.chance,
         is_usual: usual.is_some(),
     };
     let witnesses = sky.witnesses();
-    let solid_angles_sr: Vec<f64> = levels
-        .cells
-        .iter()
-        .map(|cell| cell.solid_angle_sr)
-        .collect();
     let clouds::Clouds {
         cells: clouds,
         share,
-    } = sky.clouds(&witnesses, &solid_angles_sr);
+    } = sky.clouds(&witnesses, &levels);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
     let no_brightness = brightness::refusal(picture, &clear_sky);
     let light = |cell: usize| match no_brightness {

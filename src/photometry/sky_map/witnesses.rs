@@ -3,6 +3,7 @@
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
 use super::stars::SkyStar;
+use crate::base::coords::{Icrs, UnitVector};
 use crate::detect::Detections;
 use crate::photometry::completeness::CountedStar;
 use crate::photometry::instrumental_mag;
@@ -20,6 +21,8 @@ pub(super) struct Sky<'a> {
     pub depths: &'a [Option<f64>],
     /// Where stars appear.
     pub places: StarPlaces,
+    /// Where the Moon is, where the date is known.
+    pub moon: Option<UnitVector<Icrs>>,
     /// What was detected.
     pub detections: &'a Detections,
     /// Fluxes are over this time.
