@@ -27,6 +27,7 @@ mod color_camera;
 mod equivalent_spot;
 mod image;
 mod lights;
+mod milky_way;
 mod motion;
 mod pattern;
 mod poisson;

@@ -87,6 +87,8 @@ pub struct Scene {
     pub vmag_sigma: f64,
     /// V magnitude of the faintest star that is drawn; no limit by default.
     pub faintest_vmag: Option<f64>,
+    /// Light of the Milky Way's faint stars over what it is; none by default.
+    pub milky_way: Option<f64>,
 }
 
 impl Default for Scene {
@@ -127,6 +129,7 @@ impl Default for Scene {
             missing: 0.0,
             vmag_sigma: 0.0,
             faintest_vmag: None,
+            milky_way: None,
         }
     }
 }
@@ -345,5 +348,10 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         faintest_vmag,
         MAGNITUDES,
         "V magnitude of the faintest star that is drawn (else the catalogue's)"
+    ),
+    optional_key!(
+        milky_way,
+        Limits::NotNegative,
+        "light of the Milky Way's faint stars, over what it is (else none)"
     ),
 ];

@@ -5,6 +5,7 @@ use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
 use super::lights::{Light, lights};
+use super::milky_way::MilkyWay;
 use super::motion::Motion;
 use super::pattern::DetectorPattern;
 use super::poisson::PoissonTable;
@@ -154,24 +155,31 @@ impl<'a> Simulator<'a> {
         pointing: &Pointing,
         seed: u64,
     ) -> Result<(Frame<'static>, Truth), FrameError> {
-        self.exposed(seed, |sampler, reach_px, random| {
+        self.exposed(seed, Some(pointing), |sampler, reach_px, random| {
             sampler.on_frame(pointing, self.stars, reach_px, random)
         })
     }
 
-    /// The true sky of the frame with this `seed`.
+    /// The true sky of the frame at a `pointing` with this `seed`.
     #[doc(hidden)]
-    pub fn true_sky(&self, seed: u64) -> TrueSky<'_> {
+    pub fn true_sky(&self, pointing: &Pointing, seed: u64) -> TrueSky<'_> {
         let mut random = random(seed, FrameStream::Scene);
         // As for a frame: what is drawn before the clouds.
         self.scene.angular_rate_rad_s(&mut random);
         TrueSky {
-            sky: Sky::new(&self.scenario, &self.scene, &self.camera, &mut random),
+            sky: self.sky(Some(pointing), &mut random),
             lights: self.lights(seed),
             camera: &self.camera,
             mag_arcsec2: self.scenario.conditions.sky.mag_arcsec2(),
             sky_e: self.light.budget().background_e,
         }
+    }
+
+    fn sky(&self, pointing: Option<&Pointing>, random: &mut ChaCha8Rng) -> Sky<'_> {
+        let mag_arcsec2 = self.scenario.conditions.sky.mag_arcsec2();
+        let milky_way =
+            pointing.and_then(|pointing| MilkyWay::new(&self.scene, pointing, mag_arcsec2));
+        Sky::new(&self.scenario, &self.scene, &self.camera, random).with(milky_way)
     }
 
     fn lights(&self, seed: u64) -> Vec<Light> {
@@ -194,7 +202,7 @@ impl<'a> Simulator<'a> {
         stars: &[(PixelPoint, f64)],
         seed: u64,
     ) -> Result<(Frame<'static>, Truth), FrameError> {
-        self.exposed(seed, |sampler, _, _| {
+        self.exposed(seed, None, |sampler, _, _| {
             let star = |(number, &(position, v_mag)): (usize, &(PixelPoint, f64))| TrueStar {
                 number,
                 catalog: None,
@@ -242,6 +250,7 @@ impl<'a> Simulator<'a> {
     fn exposed(
         &self,
         seed: u64,
+        pointing: Option<&Pointing>,
         seen: impl FnOnce(&StarSampler, f64, &mut ChaCha8Rng) -> Vec<TrueStar>,
     ) -> Result<(Frame<'static>, Truth), FrameError> {
         let (sheet, scene) = (&self.scenario.camera, &self.scene);
@@ -252,7 +261,7 @@ impl<'a> Simulator<'a> {
         let angular_rate_rad_s = scene.angular_rate_rad_s(&mut random);
         let turn_rad = angular_rate_rad_s * exposure_s;
         let motion = Motion::new(&self.camera, turn_rad, conditions.motion_px);
-        let sky = Sky::new(&self.scenario, scene, &self.camera, &mut random);
+        let sky = self.sky(pointing, &mut random);
         let mut image = self.image();
         sky.expose(&mut image, budget.background_e);
         let background_e = mean(image.pixels()) + budget.dark_e;

@@ -2,6 +2,7 @@
 
 use super::image::ElectronImage;
 use super::lights::{moon_direction, moon_vmag};
+use super::milky_way::MilkyWay;
 use super::scene::Scene;
 use super::skyline::{Skyline, zenith_of};
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
@@ -30,6 +31,25 @@ pub(super) struct Sky<'a> {
     moonlight: Option<Moonlight>,
     skyline: Option<Skyline>,
     altitudes: Option<Altitudes>,
+    milky_way: Option<MilkyWay>,
+}
+
+/// Parts of the light at a place.
+struct Parts {
+    /// Change by the gradient.
+    gradient: f64,
+    /// Airglow.
+    glow: f64,
+    /// Moonlight and light of clouds, over the airglow.
+    moon: f64,
+    cloud: f64,
+    milky_way: f64,
+}
+
+impl Parts {
+    fn light(&self) -> f64 {
+        self.gradient.max(0.0) * self.glow * (1.0 + self.moon + self.cloud) + self.milky_way
+    }
 }
 
 impl<'a> Sky<'a> {
@@ -54,7 +74,13 @@ impl<'a> Sky<'a> {
             moonlight: Moonlight::new(scenario, scene, camera),
             skyline: Skyline::new(scenario, scene, camera, random.clone()),
             altitudes: (scene.by_altitude > 0.0).then(|| Altitudes::new(scenario, camera)),
+            milky_way: None,
         }
+    }
+
+    /// The same with the Milky Way.
+    pub(super) fn with(self, milky_way: Option<MilkyWay>) -> Self {
+        Self { milky_way, ..self }
     }
 
     /// Fraction of a star's light that skyline, clouds and lens transmit at `place`.
@@ -80,7 +106,8 @@ impl<'a> Sky<'a> {
         let is_even = is_pinhole
             && self.vignetting == 0.0
             && self.slope == [0.0; 2]
-            && self.altitudes.is_none();
+            && self.altitudes.is_none()
+            && self.milky_way.is_none();
         let is_open = self.clouds.is_none() && self.skyline.is_none();
         if is_even && is_open && self.moonlight.is_none() {
             return image.pixels_mut().fill(sky_e);
@@ -97,6 +124,10 @@ impl<'a> Sky<'a> {
         let altitudes = self.altitudes.as_ref();
         let glow = altitudes.map(|altitudes| {
             CoarseGrid::of(image, GRID_PX, |place| altitudes.glow(place, self.camera))
+        });
+        let milky_way = self.milky_way.as_ref();
+        let milky_way = milky_way.map(|milky_way| {
+            CoarseGrid::of(image, GRID_PX, |place| self.starlight(milky_way, place))
         });
         let centre = self.camera.centre();
         for (y, row) in image.rows_mut() {
@@ -116,9 +147,14 @@ impl<'a> Sky<'a> {
                 let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
                     light * Clouds::thickness_of(grid.at(x, y))
                 });
-                let glow = glow.as_ref().map_or(1.0, |grid| grid.at(x, y));
-                let sky = gradient.max(0.0) * glow * (1.0 + moon + cloud);
-                *pixel = sky_e * sky * self.lens(&place);
+                let parts = Parts {
+                    gradient,
+                    glow: glow.as_ref().map_or(1.0, |grid| grid.at(x, y)),
+                    moon,
+                    cloud,
+                    milky_way: milky_way.as_ref().map_or(0.0, |grid| grid.at(x, y)),
+                };
+                *pixel = sky_e * parts.light() * self.lens(&place);
             }
         }
     }
@@ -142,8 +178,26 @@ impl<'a> Sky<'a> {
             clouds.light * Clouds::thickness_of(clouds.height(place))
         });
         let altitudes = self.altitudes.as_ref();
-        let glow = altitudes.map_or(1.0, |altitudes| altitudes.glow(place, self.camera));
-        Some(gradient.max(0.0) * glow * (1.0 + moon + cloud))
+        let milky_way = self.milky_way.as_ref();
+        let parts = Parts {
+            gradient,
+            glow: altitudes.map_or(1.0, |altitudes| altitudes.glow(place, self.camera)),
+            moon,
+            cloud,
+            milky_way: milky_way.map_or(0.0, |milky_way| self.starlight(milky_way, place)),
+        };
+        Some(parts.light())
+    }
+
+    /// Light of the Milky Way that air and clouds let through.
+    fn starlight(&self, milky_way: &MilkyWay, place: &PixelPoint) -> f64 {
+        let clouds = self.clouds.as_ref();
+        let clouds = clouds.map_or(1.0, |clouds| clouds.transmission(place));
+        let altitudes = self.altitudes.as_ref();
+        let air = altitudes.map_or(1.0, |altitudes| {
+            altitudes.transmission(place, self.camera) * altitudes.solid_angle(place, self.camera)
+        });
+        clouds * air * milky_way.at(self.camera, place)
     }
 
     /// Transmission of the lens relative to the centre.
@@ -334,10 +388,14 @@ impl Altitudes {
         let glow = self
             .zenith_rad(place, camera)
             .map(|zenith_rad| Self::airglow(zenith_rad, self.transmission));
-        let seen = glow.zip(solid_angle_sr(camera, place));
-        seen.map_or(0.0, |(glow, solid_angle_sr)| {
-            glow / self.glow * solid_angle_sr / self.solid_angle_sr
+        glow.map_or(0.0, |glow| {
+            glow / self.glow * self.solid_angle(place, camera)
         })
+    }
+
+    /// Solid angle of a pixel over that for which the scenario's sky is.
+    fn solid_angle(&self, place: &PixelPoint, camera: &CameraModel) -> f64 {
+        solid_angle_sr(camera, place).map_or(0.0, |of_pixel| of_pixel / self.solid_angle_sr)
     }
 }
 

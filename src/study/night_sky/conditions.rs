@@ -198,6 +198,7 @@ impl Conditions {
         conditions.extinction = Extinction::MagPerAirmass(self.true_extinction_mag);
         let scene = &mut setup.scene;
         scene.by_altitude = 1.0;
+        scene.milky_way = Some(1.0);
         scene.cloud_mag = self.clouds.mag;
         scene.cloud_share = Some(self.clouds.share);
         scene.cloud_size_px = self.clouds.size_px;

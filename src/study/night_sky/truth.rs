@@ -41,7 +41,7 @@ impl<'a> Truth<'a> {
         conditions: &Conditions,
     ) -> Self {
         Self {
-            sky: simulator.true_sky(conditions.seed),
+            sky: simulator.true_sky(pointing, conditions.seed),
             simulator,
             pointing,
         }
