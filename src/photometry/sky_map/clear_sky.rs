@@ -6,14 +6,15 @@
 //!
 //! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field; s is 0 where gray
 //! levels are proportional to light, and V̄ is the mean of the stars. What is known of
-//! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars,
-//! so the relation is that of the brightest ones: stars well below it are left out, round by round.
+//! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars:
+//! a part of them is in clear air, and the others are dimmer by anything.
 
 use super::stars::SkyStar;
 use crate::base::statistics::{Estimate, median};
 use crate::photometry::Measured;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use nalgebra::{SMatrix, SVector};
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// Unknowns: Z, c, k, a, b, s, q.
 const UNKNOWNS: usize = 7;
@@ -61,6 +62,9 @@ const MIN_STARS: usize = 20;
 /// by the error that they have would prefer those that noise makes brighter.
 /// Where they are too few, fainter ones count.
 const LARGEST_SIGMAS_MAG: [f64; 3] = [0.1, 0.25, 0.6];
+
+/// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
+pub(super) const MEAN_CLOUD_MAG: f64 = 1.0;
 
 /// The air without clouds, and the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,6 +121,77 @@ impl StarErrors {
     }
 }
 
+/// A fit to stars in clear air, among others.
+struct ClearFit {
+    fit: Fit,
+    errors: StarErrors,
+    /// Number of stars in clear air.
+    stars: usize,
+    /// Part of the stars that is behind clouds.
+    clouded: f64,
+}
+
+impl ClearFit {
+    /// From the height of the relation at which this share of the stars is above it.
+    fn from(candidates: &[Candidate], largest_mag: f64, is_flat: bool, above: f64) -> Option<Self> {
+        const ROUNDS: usize = 50;
+        const SETTLED_MAG: f64 = 1e-4;
+        /// Stars in clear air, and behind clouds, which a frame has beforehand.
+        const BEFOREHAND: f64 = 0.5;
+        let mut fitted = Self {
+            fit: Fit::first(candidates, largest_mag, is_flat, above)?,
+            errors: StarErrors {
+                scale: 1.0,
+                scatter_mag: 0.2,
+            },
+            stars: 0,
+            clouded: 0.5,
+        };
+        for _ in 0..ROUNDS {
+            let Self { fit, errors, .. } = &fitted;
+            let counting = candidates
+                .iter()
+                .filter(|star| star.counts(fit, largest_mag));
+            let stars: Vec<(&Candidate, Kind)> = counting
+                .map(|star| (star, star.kind(fit, errors, fitted.clouded)))
+                .collect();
+            let clear = clear_stars(&stars);
+            if clear < MIN_STARS as f64 {
+                return None;
+            }
+            let mut next = Fit::of(&stars, fit, errors, is_flat)?;
+            let next_errors = errors_of(&stars, &next);
+            let changed_mag = (next_errors.scatter_mag - errors.scatter_mag).abs();
+            let moved_mag = (next.unknowns - fit.unknowns).amax();
+            next.covariance *= next.scatter_over_errors(&stars, &next_errors).max(1.0);
+            let cloudy: f64 = stars.iter().map(|(_, kind)| kind.cloud).sum();
+            fitted = Self {
+                fit: next,
+                errors: next_errors,
+                stars: clear.round() as usize,
+                clouded: (BEFOREHAND + cloudy) / (2.0 * BEFOREHAND + clear + cloudy),
+            };
+            if changed_mag.max(moved_mag) < SETTLED_MAG {
+                break;
+            }
+        }
+        Some(fitted)
+    }
+
+    /// Logarithm of the likelihood of `stars` and of the unknowns by experience.
+    fn ln_posterior(&self, stars: &[&Candidate], is_flat: bool) -> f64 {
+        let of_star = |star: &&Candidate| {
+            let kind = star.kind(&self.fit, &self.errors, self.clouded);
+            kind.ln_likelihood
+        };
+        let known = Fit::experience(is_flat).into_iter();
+        let off = known
+            .zip(&self.fit.unknowns)
+            .map(|(known, value)| -0.5 * ((value - known.value) / known.sigma).powi(2));
+        stars.iter().map(of_star).sum::<f64>() + off.sum::<f64>()
+    }
+}
+
 /// A star by which it may be measured.
 struct Candidate {
     row: SVector<f64, UNKNOWNS>,
@@ -154,16 +229,50 @@ impl Candidate {
         self.sigma_mag * libm::pow(10.0, 0.4 * self.residual_mag(fit))
     }
 
-    /// Whether it belongs to the clear sky of a fit.
-    fn is_kept(&self, fit: &Fit, errors: &StarErrors, largest_mag: f64) -> bool {
-        /// Stars this far below the relation are behind clouds, or variable,
-        const LOW_SIGMAS: f64 = 2.5;
-        /// and this far above it something else.
-        const HIGH_SIGMAS: f64 = 4.0;
-        let expected_mag = self.expected_sigma_mag(fit);
-        let off = self.residual_mag(fit) / errors.of(expected_mag);
-        expected_mag < largest_mag && (-LOW_SIGMAS..HIGH_SIGMAS).contains(&off)
+    /// Whether it counts, by the error that it would have.
+    fn counts(&self, fit: &Fit, largest_mag: f64) -> bool {
+        self.expected_sigma_mag(fit) < largest_mag
     }
+
+    /// What it is by a fit where a part `clouded` of the stars is behind clouds.
+    fn kind(&self, fit: &Fit, errors: &StarErrors, clouded: f64) -> Kind {
+        /// Share of stars of which nothing is known: variable ones, wrong names.
+        const UNTRUE: f64 = 0.02;
+        /// Their magnitudes are anything within this range.
+        const UNTRUE_RANGE_MAG: f64 = 6.0;
+        let dimmer_mag = -self.residual_mag(fit);
+        let sigma_mag = errors.of(self.expected_sigma_mag(fit));
+        let off = dimmer_mag / sigma_mag;
+        let clear = libm::exp(-0.5 * off * off) / (sigma_mag * TAU.sqrt());
+        // An exponential distribution with the star's error.
+        let per_mean = sigma_mag / MEAN_CLOUD_MAG;
+        let cloud = libm::exp(0.5 * per_mean * per_mean - dimmer_mag / MEAN_CLOUD_MAG)
+            * normal_share(off - per_mean)
+            / MEAN_CLOUD_MAG;
+        let clear = (1.0 - UNTRUE) * (1.0 - clouded) * clear;
+        let cloud = (1.0 - UNTRUE) * clouded * cloud;
+        let all = clear + cloud + UNTRUE / UNTRUE_RANGE_MAG;
+        Kind {
+            clear: clear / all,
+            cloud: cloud / all,
+            ln_likelihood: libm::log(all),
+        }
+    }
+}
+
+/// What a star is.
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    /// Probability that it is in clear air, and that it is behind clouds.
+    clear: f64,
+    cloud: f64,
+    /// Logarithm of the likelihood of its magnitude.
+    ln_likelihood: f64,
+}
+
+/// Share of a normal distribution below a value in standard deviations.
+fn normal_share(sigmas: f64) -> f64 {
+    0.5 * libm::erfc(-sigmas * FRAC_1_SQRT_2)
 }
 
 impl ClearSky {
@@ -264,8 +373,13 @@ impl ClearSky {
     }
 }
 
+/// Number of stars in clear air.
+fn clear_stars(stars: &[(&Candidate, Kind)]) -> f64 {
+    stars.iter().map(|(_, kind)| kind.clear).sum()
+}
+
 /// The errors of stars. Only what is above the relation is noise alone.
-fn errors_of(stars: &[&Candidate], fit: &Fit) -> StarErrors {
+fn errors_of(stars: &[(&Candidate, Kind)], fit: &Fit) -> StarErrors {
     /// Least scatter of a star: its catalogue magnitude and its pixels.
     const LEAST_MAG: f64 = 0.01;
     const MOST_MAG: f64 = 0.5;
@@ -273,8 +387,9 @@ fn errors_of(stars: &[&Candidate], fit: &Fit) -> StarErrors {
     const PER_MEDIAN: f64 = 1.4826;
     /// Stated errors too large by less than this are right.
     const LARGEST_SCALE: f64 = 0.8;
-    let above = stars.iter().filter(|star| star.residual_mag(fit) > 0.0);
-    let pairs = above.map(|star| {
+    let clear = stars.iter().filter(|(_, kind)| kind.clear > 0.5);
+    let above = clear.filter(|(star, _)| star.residual_mag(fit) > 0.0);
+    let pairs = above.map(|(star, _)| {
         let seen_mag = PER_MEDIAN * star.residual_mag(fit);
         (seen_mag, star.expected_sigma_mag(fit))
     });
@@ -334,43 +449,28 @@ impl Fit {
 
     /// The fit to the stars that are not dimmed and have at most this expected error, their errors, and their
     /// number. `None` if they are too few.
+    ///
+    /// Clear stars and those behind clouds are told apart by expectation and maximization, from several
+    /// heights of the relation: the likeliest one counts.
     fn of_clear_sky(
         candidates: &[Candidate],
         largest_mag: f64,
         is_flat: bool,
     ) -> Option<(Self, StarErrors, usize)> {
-        const ROUNDS: usize = 30;
-        /// The errors of the first round.
-        const FIRST: StarErrors = StarErrors {
-            scale: 1.0,
-            scatter_mag: 0.2,
-        };
-        let mut fit = Self::first(candidates, largest_mag, is_flat)?;
-        let (mut errors, mut used) = (FIRST, 0);
-        for _ in 0..ROUNDS {
-            let kept = |star: &&Candidate| star.is_kept(&fit, &errors, largest_mag);
-            let kept: Vec<&Candidate> = candidates.iter().filter(kept).collect();
-            if kept.len() < MIN_STARS {
-                return None;
-            }
-            let next = Self::of(&kept, &fit, &errors, is_flat)?;
-            let next_errors = errors_of(&kept, &next);
-            let changed_mag = (next_errors.scatter_mag - errors.scatter_mag).abs();
-            let is_settled = kept.len() == used && changed_mag < 1e-4;
-            let scale = next.scatter_over_errors(&kept, &next_errors).max(1.0);
-            (fit, errors, used) = (next, next_errors, kept.len());
-            fit.covariance *= scale;
-            if is_settled {
-                break;
-            }
-        }
-        Some((fit, errors, used))
+        /// Shares of the stars that are above the relation at first.
+        const ABOVE: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
+        let highest = Self::first(candidates, largest_mag, is_flat, ABOVE[0])?;
+        let counting = |star: &&Candidate| star.counts(&highest, largest_mag);
+        let common: Vec<&Candidate> = candidates.iter().filter(counting).collect();
+        let from = |above| ClearFit::from(candidates, largest_mag, is_flat, above);
+        let fits = ABOVE.into_iter().filter_map(from);
+        let rated = fits.map(|fit| (fit.ln_posterior(&common, is_flat), fit));
+        let (_, best) = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((best.fit, best.errors, best.stars))
     }
 
-    /// The relation of experience, as high as the brightest of the stars ask for.
-    fn first(stars: &[Candidate], largest_mag: f64, is_flat: bool) -> Option<Self> {
-        /// Share of the stars above it.
-        const TOP: f64 = 0.3;
+    /// The relation of experience, so high that this share of the stars is above it.
+    fn first(stars: &[Candidate], largest_mag: f64, is_flat: bool, share: f64) -> Option<Self> {
         let mut fit = Self {
             unknowns: SVector::from(Self::experience(is_flat).map(|known| known.value)),
             covariance: SMatrix::zeros(),
@@ -378,12 +478,19 @@ impl Fit {
         let bright = stars.iter().filter(|star| star.sigma_mag < largest_mag);
         let mut above: Vec<f64> = bright.map(|star| star.residual_mag(&fit)).collect();
         above.sort_unstable_by(|a, b| b.total_cmp(a));
-        fit.unknowns[0] += above.get((TOP * above.len() as f64) as usize)?;
+        fit.unknowns[0] += above.get((share * above.len() as f64) as usize)?;
         Some(fit)
     }
 
-    /// The fit to `stars`, with the errors that they have by the fit `before`.
-    fn of(stars: &[&Candidate], before: &Self, errors: &StarErrors, is_flat: bool) -> Option<Self> {
+    /// The fit to `stars`, by what they are and the errors that they have by the fit `before`.
+    fn of(
+        stars: &[(&Candidate, Kind)],
+        before: &Self,
+        errors: &StarErrors,
+        is_flat: bool,
+    ) -> Option<Self> {
+        /// Least information of a star, over what it has if it is known to be clear.
+        const LEAST: f64 = 0.1;
         let known = Self::experience(is_flat);
         let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         let mut right = SVector::<f64, UNKNOWNS>::zeros();
@@ -391,26 +498,30 @@ impl Fit {
             normal[(unknown, unknown)] += sigma.powi(-2);
             right[unknown] += value * sigma.powi(-2);
         }
-        for star in stars {
+        let mut information = normal;
+        for (star, kind) in stars {
             let variance = errors.of(star.expected_sigma_mag(before)).powi(2);
-            normal += star.row * star.row.transpose() / variance;
-            right += star.row * (star.offset_mag / variance);
+            let square = star.row * star.row.transpose() * (kind.clear / variance);
+            normal += square;
+            right += star.row * (kind.clear * star.offset_mag / variance);
+            // What is lost as it may be behind clouds (Louis 1982, J. R. Stat. Soc. B 44, 226).
+            let lost = (1.0 - kind.clear) * star.residual_mag(before).powi(2) / variance;
+            information += square * (1.0 - lost).max(LEAST);
         }
-        let root = normal.cholesky()?;
         Some(Self {
-            unknowns: root.solve(&right),
-            covariance: root.inverse(),
+            unknowns: normal.cholesky()?.solve(&right),
+            covariance: information.cholesky()?.inverse(),
         })
     }
 
     /// Mean of the squared residuals of its stars over their variances, for the number of unknowns.
-    fn scatter_over_errors(&self, stars: &[&Candidate], errors: &StarErrors) -> f64 {
-        let square = |star: &&Candidate| {
+    fn scatter_over_errors(&self, stars: &[(&Candidate, Kind)], errors: &StarErrors) -> f64 {
+        let square = |(star, kind): &(&Candidate, Kind)| {
             let sigma_mag = errors.of(star.expected_sigma_mag(self));
-            (star.residual_mag(self) / sigma_mag).powi(2)
+            kind.clear * (star.residual_mag(self) / sigma_mag).powi(2)
         };
         let sum: f64 = stars.iter().map(square).sum();
-        sum / stars.len().saturating_sub(UNKNOWNS).max(1) as f64
+        sum / (clear_stars(stars) - UNKNOWNS as f64).max(1.0)
     }
 
     fn variance(&self, row: &SVector<f64, UNKNOWNS>) -> f64 {

@@ -7,6 +7,7 @@
 //! light (`cloud_light`).
 
 use super::brightness::Levels;
+use super::clear_sky::MEAN_CLOUD_MAG;
 use super::cloud_light::{CloudLight, Hidden, LitCell, terms};
 use super::grid::CELLS_OF_A_STAR;
 use super::relative_limit::RelativeLimit;
@@ -23,8 +24,6 @@ const HALF_STEPS: usize = 60;
 const HALVES: f64 = 0.3;
 /// What is compared: clouds over all of a cell, then over half of it.
 const CASES: usize = STEPS + HALF_STEPS;
-/// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
-const MEAN_CLOUD_MAG: f64 = 1.0;
 /// Below this extinction beyond that of clear air, in magnitudes, a sky counts as clear.
 pub const CLEAR_MAG: f64 = 0.2;
 /// Variation of clear air, in magnitudes.
