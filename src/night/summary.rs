@@ -29,9 +29,9 @@ pub struct NightSummary {
     pub held: usize,
     pub unread: usize,
     pub hours: f64,
-    pub clear_hours: f64,
+    pub clear_hours: Option<f64>,
     pub dark_hours: f64,
-    pub clear_dark_hours: f64,
+    pub clear_dark_hours: Option<f64>,
     pub darkest_hour: Option<DarkestHour>,
     pub median: Medians,
     pub knocks: Vec<Knock>,
@@ -76,6 +76,7 @@ pub struct MapCell {
 pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> NightSummary {
     let count = |is: fn(&NightRow) -> bool| rows.iter().filter(|row| is(row)).count();
     let hours = |is: fn(&NightRow) -> bool| finite(hours_of(rows, is), 3).unwrap_or(0.0);
+    let is_known = rows.iter().any(|row| row.cloud_share.is_some());
     let is_dark = |row: &NightRow| row.twilight == "night";
     let mut dates = rows
         .iter()
@@ -92,9 +93,9 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
         held: count(|row| row.pointing == "held"),
         unread: count(NightRow::is_unread),
         hours: hours(|_| true),
-        clear_hours: hours(is_clear),
+        clear_hours: is_known.then(|| hours(is_clear)),
         dark_hours: hours(is_dark),
-        clear_dark_hours: hours(|row| row.twilight == "night" && is_clear(row)),
+        clear_dark_hours: is_known.then(|| hours(|row| row.twilight == "night" && is_clear(row))),
         darkest_hour: darkest_hour(rows),
         median: Medians {
             zenith_mag_arcsec2: median_of(rows, |row| row.zenith_mag_arcsec2),

@@ -23,10 +23,10 @@ pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow
     Ok(Page {
         title: format!("Night of {}", summary.first_date),
         question: "How was the night?".to_owned(),
-        answer: format!(
-            "{:.1} of {:.1} hours were clear.",
-            summary.clear_hours, summary.hours
-        ),
+        answer: match summary.clear_hours {
+            Some(clear) => format!("{clear:.1} of {:.1} hours were clear.", summary.hours),
+            None => "No frame tells of clouds.".to_owned(),
+        },
         facts: text::medians(summary)
             .map(|median| Fact::new(format!("Median {}", median.name), median.value))
             .collect(),

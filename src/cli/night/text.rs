@@ -15,10 +15,16 @@ pub(super) fn text(night: &NightSummary) -> String {
         night.held,
         night.unread
     );
+    let clear = |hours: Option<f64>| {
+        hours.map_or(String::new(), |hours| format!(", {hours:.2} of them clear"))
+    };
     let _ = writeln!(
         text,
-        "hours      {:.2}, {:.2} of them clear; {:.2} without twilight, {:.2} of them clear",
-        night.hours, night.clear_hours, night.dark_hours, night.clear_dark_hours
+        "hours      {:.2}{}; {:.2} without twilight{}",
+        night.hours,
+        clear(night.clear_hours),
+        night.dark_hours,
+        clear(night.clear_dark_hours)
     );
     if let Some(hour) = &night.darkest_hour {
         let _ = writeln!(

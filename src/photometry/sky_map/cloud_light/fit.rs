@@ -194,26 +194,26 @@ impl Fit {
     }
 
     /// By how much the logarithm of the likelihood of a cell's stars is larger if its light foretells the
-    /// clouds: than with a share `clouded` for all cells, and, where light tells of clouds, than if it were
-    /// clear.
-    pub(super) fn gains(&self, lit: &LitCell, before: &Hidden, clouded: f64) -> [f64; 2] {
+    /// clouds: than with a part `clouded` of the sky for all cells, than with that of this fit, and, where
+    /// light tells of clouds, than if it were clear.
+    pub(super) fn gains(&self, lit: &LitCell, before: &Hidden, clouded: f64) -> [f64; 3] {
         let excess = self.excess(lit);
         let [mut foretold, mut light_all, mut cloudy] = [0.0; 3];
-        let [mut by_share, mut if_clear, mut clear_all, mut share_all] = [0.0; 4];
+        let [mut by_part, mut by_part_here, mut if_clear] = [0.0; 3];
         for step in 0..=STEPS {
             let light = self.likelihood(excess, share_of(step));
             foretold += light * lit.hidden.mixed(step, self.clouded);
             light_all += light * before.mixed(step, self.clouded);
             cloudy += light * self.clouded * before.cloud[step];
-            by_share += lit.hidden.mixed(step, clouded);
-            share_all += before.mixed(step, clouded);
+            by_part += lit.hidden.mixed(step, clouded);
+            by_part_here += lit.hidden.mixed(step, self.clouded);
             if_clear += lit.hidden.clear[step];
-            clear_all += before.clear[step];
         }
         let foretold = libm::log(foretold / light_all);
         [
-            foretold - libm::log(by_share / share_all),
-            cloudy / light_all * (foretold - libm::log(if_clear / clear_all)),
+            foretold - libm::log(by_part),
+            foretold - libm::log(by_part_here),
+            cloudy / light_all * (foretold - libm::log(if_clear)),
         ]
     }
 }

@@ -36,8 +36,8 @@ impl CloudLight {
         let gains = cells
             .iter()
             .map(|lit| fit.gains(lit, before, clouded))
-            .fold([0.0, 0.0], |sum, gains| {
-                [sum[0] + gains[0], sum[1] + gains[1]]
+            .fold([0.0; 3], |sum, gains| {
+                std::array::from_fn(|i| sum[i] + gains[i])
             });
         // Neighbours share stars.
         let is_told = |gain: f64| gain > LEAST_GAIN * CELLS_OF_A_STAR;
