@@ -3,7 +3,7 @@
 
     scripts/validate-trails.py target/release/starpipe [--frames 200] [--seed 1]
 
-Each frame is drawn with some trails, 1.5 on average, and without them. Lengths and brightnesses are random. A
+Each frame is drawn with some trails, 1.5 on average, without them, and without them with other noise. Lengths and brightnesses are random. A
 trail's height is that of its ridge over the noise of a pixel.
 """
 
@@ -72,6 +72,20 @@ def frames(program, directory, count, seed):
     return magnitudes
 
 
+def redraw(program, directory, reports, seed):
+    """Draws the frames without trails a second time, with other noise."""
+    for name, report in reports.items():
+        at = report["attitude"]
+        if at and name.startswith("without"):
+            out = directory / f"{name.replace('without', 'again')}.tif"
+            run(program, "simulate", f"--camera={directory / 'camera.toml'}", f"--ra={at['ra_deg']}", f"--dec={at['dec_deg']}", f"--roll={at['up_pa_deg']}", f"--seed={seed + 1}", f"--exposure={EXPOSURE_S}", f"--out={out}", "--force")
+
+
+def lost(stars, report):
+    """Stars that a frame does not have."""
+    return sum(not any(math.hypot(star["x"] - s["x"], star["y"] - s["y"]) < 0.5 for s in report["stars"]) for star in stars)
+
+
 def truth(path, vmag, report):
     """Ends on the frame, length, and height over the noise of its trails."""
     zero_point = report["photometry"]["zero_point_vmag"]
@@ -122,14 +136,17 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     cells = {(height, length): [0, 0] for height in HEIGHTS[:-1] for length in LENGTHS[:-1]}
-    false, false_without, offs, ends_off, fluxes, stars, lost = 0, 0, [], [], [], 0, 0
+    false, false_without, offs, ends_off, fluxes, stars = 0, 0, [], [], [], 0
+    lost_with, lost_again = 0, 0
     left_out = 0
     with tempfile.TemporaryDirectory() as name:
         directory = pathlib.Path(name)
         camera(options.program, directory / "camera.toml")
         magnitudes = frames(options.program, directory, options.frames, options.seed)
         reports = {}
-        for kind in ("with", "without"):
+        for kind in ("with", "without", "again"):
+            if kind == "again":
+                redraw(options.program, directory, reports, options.seed)
             files = sorted(directory.glob(f"{kind}-*.tif"))
             text = run(options.program, "process", f"--camera={directory / 'camera.toml'}", "--trails", "--format=json", *files)
             for line in text.splitlines():
@@ -159,7 +176,8 @@ def main():
             false += sum(not any(is_same(true, found) for true in trails) for found in seen["trails"])
             sure = [star for star in clean["stars"] if star["snr"] > 10 and not near_trail(trails, star)]
             stars += len(sure)
-            lost += sum(not any(math.hypot(star["x"] - s["x"], star["y"] - s["y"]) < 0.5 for s in seen["stars"]) for star in sure)
+            lost_with += lost(sure, seen)
+            lost_again += lost(sure, reports[f"again-{number:03}"])
     print("| height of the ridge over the noise | " + " | ".join(f"{a} to {b} px long" for a, b in itertools.pairwise(LENGTHS)) + " |")
     print("|---" * len(LENGTHS) + "|")
     for low, high in itertools.pairwise(HEIGHTS):
@@ -170,7 +188,7 @@ def main():
     print(f"place across: median error {statistics.median(map(abs, offs)):.3f} px")
     print(f"ends: median error {statistics.median(map(abs, ends_off)):.2f} px, 90 % within {sorted(map(abs, ends_off))[int(0.9 * len(ends_off))]:.1f} px")
     print(f"flux: median error {statistics.median(fluxes):+.3f}, median of its size {statistics.median(map(abs, fluxes)):.3f}")
-    print(f"stars of S/N 10 that are not near a trail: {stars}, lost {lost}")
+    print(f"stars of S/N 10 that are not near a trail: {stars}, lost {lost_with}; with other noise and no trail {lost_again}")
 
 
 if __name__ == "__main__":

@@ -45,7 +45,34 @@ impl CellMap {
         map.mask_stars(search);
         map.mask_what_hides_the_sky(search);
         map.level();
+        let scatter = map.scatter_of_runs();
+        for value in &mut map.values {
+            *value /= scatter;
+        }
         map
+    }
+
+    /// Standard deviation of the sums of neighbours along rows and columns, over that of independent cells:
+    /// 1, or more where noise is correlated, as in JPEG files.
+    fn scatter_of_runs(&self) -> f32 {
+        const RUN: usize = 8;
+        const MIN_RUNS: usize = 100;
+        let of = |[first, second]: [usize; 2], strides: [usize; 2]| {
+            let starts = (0..second).flat_map(|line| {
+                (0..first / RUN).map(move |run| line * strides[1] + run * RUN * strides[0])
+            });
+            let cells = |start: usize| (0..RUN).map(move |step| start + step * strides[0]);
+            let free = starts.filter(|&start| cells(start).all(|cell| self.is_free[cell]));
+            let sum = |start: usize| cells(start).map(|cell| f64::from(self.values[cell])).sum();
+            let mut sums: Vec<f64> = free.map(sum).collect();
+            if sums.len() < MIN_RUNS {
+                return 1.0;
+            }
+            median_and_sigma(&mut sums).1 / (RUN as f64).sqrt()
+        };
+        let along_rows = of([self.columns, self.rows], [1, self.columns]);
+        let along_columns = of([self.rows, self.columns], [self.columns, 1]);
+        along_rows.max(along_columns).max(1.0) as f32
     }
 
     /// Adds up the pixels above the background; cells without a part of them are not free.
@@ -242,8 +269,8 @@ impl CellMap {
             false => median_and_sigma(&mut beside).1,
         };
         let noise = if scatter > MAX_SCATTER { scatter } else { 1.0 };
-        let snr = self.snr_of(ends_px, 0.0).unwrap_or(0.0) / noise;
-        radon::log10_tail(snr) + libm::log10(radon::lines_of(self.columns, self.rows) as f64)
+        radon::log10_tail(self.snr_of(ends_px, 0.0).unwrap_or(0.0) / noise)
+            + libm::log10(radon::lines_of(self.columns, self.rows) as f64)
     }
 
     /// Sum of the cells along a line, moved across by so many cells, over its standard deviation in noise;

@@ -119,7 +119,8 @@ impl TrailSearch<'_> {
         /// Least and greatest width, in that of a star: what is in the detector is narrower, and clouds and
         /// branches are broader.
         const WIDTHS: RangeInclusive<f64> = 0.7..=3.0;
-        const MIN_SNR: f64 = 5.0;
+        /// The faintest lines that the cells show have 10; edges of what hides the sky less.
+        const MIN_SNR: f64 = 7.0;
         /// Least difference of the ends in columns and in rows: the noise of the detector is along them.
         const MIN_SLANT_PX: f64 = 1.0;
         /// Least length, in standard deviations across.

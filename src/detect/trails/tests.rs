@@ -79,6 +79,22 @@ fn noise_and_stars_have_no_trails() {
 }
 
 #[test]
+fn correlated_noise_has_no_trails() {
+    // Blocks whose pixels have the same noise, as those of JPEG files nearly have.
+    for seed in 0..10 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let blocks: Vec<f64> = (0..WIDTH * HEIGHT / 50)
+            .map(|_| StandardNormal.sample(&mut random))
+            .collect();
+        let trails = found(seed, 80, |x, y| {
+            let block = (y as usize / 8) * (WIDTH / 8) + x as usize / 8;
+            NOISE_ADU * blocks[block]
+        });
+        assert!(trails.is_empty(), "seed {seed}: {trails:?}");
+    }
+}
+
+#[test]
 fn a_trail_that_no_pixel_shows_is_found_if_it_is_long() {
     // Four tenths of the noise at its ridge.
     let flux = 0.4 * NOISE_ADU / profile(0.0);
