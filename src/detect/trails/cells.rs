@@ -269,8 +269,12 @@ impl CellMap {
             false => median_and_sigma(&mut beside).1,
         };
         let noise = if scatter > MAX_SCATTER { scatter } else { 1.0 };
-        radon::log10_tail(self.snr_of(ends_px, 0.0).unwrap_or(0.0) / noise)
-            + libm::log10(radon::lines_of(self.columns, self.rows) as f64)
+        self.log10_lines_of_noise(self.snr_of(ends_px, 0.0).unwrap_or(0.0) / noise)
+    }
+
+    /// Decimal logarithm of the number of lines in noise that exceed this signal-to-noise ratio.
+    pub fn log10_lines_of_noise(&self, snr: f64) -> f64 {
+        radon::log10_tail(snr) + libm::log10(radon::lines_of(self.columns, self.rows) as f64)
     }
 
     /// Sum of the cells along a line, moved across by so many cells, over its standard deviation in noise;

@@ -41,6 +41,9 @@ use std::ops::RangeInclusive;
 /// Accepted number of false trails in a frame of noise: one in 1000 frames.
 const FALSE_TRAILS_PER_FRAME: f64 = 1e-3;
 
+/// Lowest mean height of a third of a line over that of all of it, where it does not fade from one place
+/// to its end, as spikes do: these have 0.87 or less.
+const EVEN: f64 = 0.9;
 /// Most rounds of search: each finds what brighter trails have hidden.
 const MAX_ROUNDS: usize = 4;
 /// Most lines that are followed pixel by pixel: the time for a frame is bounded.
@@ -96,6 +99,8 @@ impl TrailSearch<'_> {
                 }
                 followed += 1;
                 let ridge = Band::new(self, &cells, line.in_pixels(cells.side_px)).ridge();
+                let is_new = |ridge: &Ridge| !trails.iter().any(|trail| self.is_part(ridge, trail));
+                let ridge = ridge.filter(is_new);
                 let trail = ridge.and_then(|ridge| self.trail(&cells, &ridge));
                 match trail {
                     Some(trail) => {
@@ -128,8 +133,16 @@ impl TrailSearch<'_> {
         /// Least part of the height that a third of the length has, and that the line has above its
         /// brighter side.
         const MIN_EVENNESS: f64 = 0.25;
+        /// With this height over its error a line is no noise, of whatever kind.
+        const BRIGHT_SNR: f64 = 50.0;
         const MIN_CONTRAST: f64 = 0.5;
-        let log10_false_alarm = cells.log10_false_alarm(ridge.ends_px);
+        let by_cells = cells.log10_false_alarm(ridge.ends_px);
+        // Where a trail is saturated its cells are those of stars, which do not count.
+        let is_bright = ridge.snr >= BRIGHT_SNR && ridge.evenness >= EVEN;
+        let log10_false_alarm = match is_bright {
+            true => by_cells.min(cells.log10_lines_of_noise(ridge.snr)),
+            false => by_cells,
+        };
         let [one, other] = ridge.ends_px;
         let length_px = one.distance_to(&other);
         let slant_px = (one.x - other.x).abs().min((one.y - other.y).abs());
@@ -161,12 +174,27 @@ impl TrailSearch<'_> {
         })
     }
 
-    /// Whether the ridge is a spike of a saturated star: the star is at its middle or at one of its ends.
+    /// Whether the ridge is along a trail that was found.
+    fn is_part(&self, ridge: &Ridge, trail: &Trail) -> bool {
+        let [begin, end] = trail_in_view(trail, self.view);
+        let length_px = begin.distance_to(&end);
+        let reach_px = 3.0 * (ridge.width_sigma_px + trail.width_sigma_px);
+        ridge.ends_px.iter().all(|point| {
+            let (x, y) = (point.x - begin.x, point.y - begin.y);
+            ((x * (end.y - begin.y) - y * (end.x - begin.x)) / length_px).abs() < reach_px
+        })
+    }
+
+    /// Whether the ridge is a spike of a saturated star: it fades, and the star is at its middle or at one of
+    /// its ends.
     fn is_spike(&self, ridge: &Ridge) -> bool {
         /// How near, in lengths of the ridge.
         const NEAR: f64 = 0.2;
         /// Least height of the star over that of its spike. A saturated trail is as high as the star.
         const FADED: f64 = 3.0;
+        if ridge.evenness >= EVEN {
+            return false;
+        }
         let [begin, end] = ridge.ends_px;
         let length_px = begin.distance_to(&end);
         let (tx, ty) = ((end.x - begin.x) / length_px, (end.y - begin.y) / length_px);
