@@ -3,8 +3,8 @@
 
     scripts/validate-trails.py target/release/starpipe [--frames 200] [--seed 1]
 
-Each frame is drawn with some trails, 1.5 on average, without them, and without them with other noise. Lengths and brightnesses are random. A
-trail's height is that of its ridge over the noise of a pixel.
+Each frame is drawn with some trails, 1.5 on average, without them, and without them with other
+noise. Lengths and brightnesses are random. A trail's height is that of its ridge over the noise of a pixel.
 """
 
 import argparse

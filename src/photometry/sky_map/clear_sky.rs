@@ -10,11 +10,11 @@
 //! a part of them is in clear air, and the others are dimmer by anything.
 
 use super::stars::SkyStar;
-use crate::base::statistics::{Estimate, median};
+use crate::base::statistics::{Estimate, median, normal_cdf};
 use crate::photometry::Measured;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use nalgebra::{SMatrix, SVector};
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f64::consts::TAU;
 
 /// Unknowns: Z, c, k, a, b, s, q.
 const UNKNOWNS: usize = 7;
@@ -247,7 +247,7 @@ impl Candidate {
         // An exponential distribution with the star's error.
         let per_mean = sigma_mag / MEAN_CLOUD_MAG;
         let cloud = libm::exp(0.5 * per_mean * per_mean - dimmer_mag / MEAN_CLOUD_MAG)
-            * normal_share(off - per_mean)
+            * normal_cdf(off - per_mean)
             / MEAN_CLOUD_MAG;
         let clear = (1.0 - UNTRUE) * (1.0 - clouded) * clear;
         let cloud = (1.0 - UNTRUE) * clouded * cloud;
@@ -268,11 +268,6 @@ struct Kind {
     cloud: f64,
     /// Logarithm of the likelihood of its magnitude.
     ln_likelihood: f64,
-}
-
-/// Share of a normal distribution below a value in standard deviations.
-fn normal_share(sigmas: f64) -> f64 {
-    0.5 * libm::erfc(-sigmas * FRAC_1_SQRT_2)
 }
 
 impl ClearSky {

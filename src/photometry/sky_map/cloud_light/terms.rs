@@ -2,6 +2,7 @@
 
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::camera::CameraModel;
+use crate::sky::observer::airmass::airmass_krisciunas_schaefer;
 use nalgebra::{Matrix3, Vector3};
 
 /// Terms of which the light of a clear sky over a frame is a sum, with coefficients that are not known: at a
@@ -30,8 +31,7 @@ pub(in crate::photometry::sky_map) fn terms(
     let Some(zenith) = zenith else {
         return terms;
     };
-    let sin_altitude = zenith.dot(direction);
-    let depth = (0.04 + 0.96 * sin_altitude * sin_altitude).sqrt().recip();
+    let depth = airmass_krisciunas_schaefer(zenith.angle_to(direction));
     terms.extend([depth, depth * depth]);
     let galactic = galactic(direction);
     let disk = 1.0 / (DISK_THICKNESS + galactic.z.abs());
