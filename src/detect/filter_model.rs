@@ -22,7 +22,7 @@ impl FilterModel {
     pub fn new(config: &DetectConfig, size: Size, spot_sigma_px: f64, skewness: f64) -> Self {
         let kernel = Kernel::for_spot(spot_sigma_px);
         let threshold_sigma = config.threshold_sigma.unwrap_or_else(|| {
-            let u = gaussian_threshold(config, size, spot_sigma_px, &kernel);
+            let u = gaussian_threshold(config, size, config.cell_px, spot_sigma_px, &kernel);
             let weights = FilterWeights::for_spot(spot_sigma_px, kernel.radius(), size);
             threshold_for_photons(u, skewness, &weights)
         });

@@ -45,6 +45,7 @@ mod detection;
 mod error;
 mod filter;
 mod filter_model;
+mod fineness;
 mod fit;
 mod flux_limits;
 mod measure;
@@ -80,6 +81,7 @@ pub use workspace::Workspace;
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{FrameBackground, Mesh};
 use candidates::{CandidateMemory, PeakSearch};
+use fineness::CellSize;
 use measure::{MeasureBuffers, Measurement, Ring, StarShape, sharpest_px};
 use pixels::View;
 use psf::{FieldTables, PIXEL_VARIANCE_PX2};
@@ -166,16 +168,24 @@ fn run(
         set_empty_frame(frame, config, found);
         return Ok(());
     }
-    background.measure(&view, frame.step_adu, config.cell_px)?;
     *saturation_adu = config.saturation_adu(frame, saturation);
-    let input = SearchInput {
-        view: &view,
-        background,
-        saturation_adu: *saturation_adu,
-        config,
-        memory: CandidateMemory::beside(frame, *memory),
+    let memory = CandidateMemory::beside(frame, *memory);
+    let mut cells = CellSize::new(config.cell_px);
+    let (input, searched) = loop {
+        background.measure(&view, frame.step_adu, cells.px)?;
+        let input = SearchInput {
+            view: &view,
+            background,
+            cell_px: cells.px,
+            saturation_adu: *saturation_adu,
+            config,
+            memory,
+        };
+        let searched = search.run(&input)?;
+        if cells.is_settled(background, &searched, &mut search.sorted) {
+            break (input, searched);
+        }
     };
-    let searched = search.run(&input)?;
     set_levels(found, background, &searched);
     let meshes = [&background.mesh, &search.filtered.mesh];
     let pass = &searched.pass;

@@ -47,6 +47,8 @@ pub(crate) struct SearchInput<'a> {
     pub background: &'a FrameBackground,
     /// Level from which on a pixel is saturated, in ADU.
     pub saturation_adu: f32,
+    /// Side of the cells in which background and noise are measured, in pixels.
+    pub cell_px: usize,
     /// The options.
     pub config: &'a DetectConfig,
     /// For what stands out in it.
@@ -126,7 +128,8 @@ pub(crate) struct FrameSearch {
     /// Peaks and regions above the threshold.
     pub found: PeakSearch,
     raw_peaks: RawPeakFinder,
-    sorted: Vec<f32>,
+    /// A buffer.
+    pub sorted: Vec<f32>,
     noise: NoiseBuffers,
     extrema: Extrema,
     /// Buffers of fits.
@@ -239,6 +242,7 @@ impl FrameSearch {
         let SearchInput {
             view,
             background,
+            cell_px,
             saturation_adu,
             config,
             memory,
@@ -256,12 +260,12 @@ impl FrameSearch {
         let mesh = &background.mesh;
         let gaussian = config
             .threshold_sigma
-            .unwrap_or_else(|| gaussian_threshold(config, size, spot_px, &kernel));
+            .unwrap_or_else(|| gaussian_threshold(config, size, cell_px, spot_px, &kernel));
         let above = |threshold| CandidateLimits {
             threshold,
             most: memory.most_candidates(),
         };
-        filtered.filter(view, mesh, &kernel, config.cell_px, &above(gaussian))?;
+        filtered.filter(view, mesh, &kernel, cell_px, &above(gaussian))?;
         let filter = FilterWeights::for_spot(spot_px, kernel.radius(), size);
         raise_filtered_noise(&background.cut_off, &mut filtered.mesh, gaussian, &filter);
         let measured = || -> Result<_, DetectError> {

@@ -221,6 +221,18 @@ impl Mesh {
         })
     }
 
+    /// How far the background of each cell inside the frame is off the lines through those around it, twice, in
+    /// noises of a pixel.
+    pub fn bends_over_noise(&self) -> impl Iterator<Item = f32> {
+        let CellGrid { columns, rows, .. } = self.grid;
+        let inside = |count: usize| 1..count.saturating_sub(1).max(1);
+        let cells = inside(rows).flat_map(move |y| inside(columns).map(move |x| y * columns + x));
+        cells.map(move |cell| {
+            let bends = bend(self.around(cell, 1)) + bend(self.around(cell, columns));
+            bends / self.sigma[cell]
+        })
+    }
+
     /// The background of a cell between those `step` cells before and after it.
     fn around(&self, cell: usize, step: usize) -> [f32; 3] {
         [cell - step, cell, cell + step].map(|at| self.background[at])

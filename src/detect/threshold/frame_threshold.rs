@@ -21,20 +21,21 @@ const REPEAT_AT_RAISE: f64 = 0.2;
 pub(crate) fn gaussian_threshold(
     config: &DetectConfig,
     size: Size,
+    cell_px: usize,
     spot_px: f64,
     kernel: &Kernel,
 ) -> f64 {
     let u = threshold_for_rate(config.false_alarms_per_mpx, kernel.rho, kernel.rho);
-    for_estimated_noise(u, noise_degrees(size, config, spot_px))
+    for_estimated_noise(u, noise_degrees(size, cell_px, spot_px))
 }
 
 /// The degrees of freedom of the local noise estimate: the independent samples in a cell (a value
 /// of the filtered frame is correlated with 2πs² pixels), and a gain of 5 from the median of 3x3
 /// cells.
-fn noise_degrees(size: Size, config: &DetectConfig, spot_px: f64) -> f64 {
+fn noise_degrees(size: Size, cell_px: usize, spot_px: f64) -> f64 {
     const SMOOTHING_GAIN: f64 = 5.0;
     const EFFICIENCY: f64 = 0.8;
-    let cell = (size.width.min(config.cell_px) * size.height.min(config.cell_px)) as f64;
+    let cell = (size.width.min(cell_px) * size.height.min(cell_px)) as f64;
     let cells = (size.pixels() as f64 / cell).max(1.0);
     let correlated = std::f64::consts::TAU * (spot_px.powi(2) + PIXEL_VARIANCE_PX2);
     (EFFICIENCY * cell / correlated.max(1.0) * SMOOTHING_GAIN.min(cells)).max(3.0)

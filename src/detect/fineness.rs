@@ -1,0 +1,147 @@
+//! How fine the cells are in which background and noise are measured.
+//!
+//! Between the centres of cells the background is taken to be straight. Where it is not, as in a small picture of
+//! all the sky, what is left of it in the filtered frame raises the threshold, and finer cells show fainter stars.
+
+use super::background::FrameBackground;
+use super::search::Searched;
+
+/// Scatter of a parabola about its chord between the centres of two cells, over its second difference: 1/√720.
+const RMS_PER_BEND: f32 = 0.037_267_8;
+/// Largest scatter of the background about the mesh in most cells, over the noise of the filtered frame.
+const LARGEST_SCATTER: f32 = 0.5;
+/// Most cells: this share of them.
+const MOST: f32 = 0.75;
+/// Least side of a cell, over the size of a spot: the light of bright stars would be in the background.
+const LEAST_PER_SPOT: f64 = 16.0;
+/// Least side of a cell, in pixels: with fewer pixels the noise of the background would matter.
+const LEAST_PX: usize = 16;
+
+/// Finer cells count where they lower the limit to this part of it: at edges they make it worse.
+const WORTHWHILE: f64 = 0.95;
+
+/// The side of the cells of a frame, which is found by searching it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellSize {
+    /// The side, in pixels.
+    pub px: usize,
+    /// What was searched before with coarser cells.
+    coarser: Option<Tried>,
+    /// Whether finer ones have been tried, and did not help.
+    is_final: bool,
+}
+
+/// A search with cells of a size.
+#[derive(Debug, Clone, Copy)]
+struct Tried {
+    cell_px: usize,
+    /// Flux at which half of the stars are detected, in ADU.
+    limit_adu: f64,
+}
+
+impl CellSize {
+    /// Cells of this side to begin with.
+    pub fn new(px: usize) -> Self {
+        Self {
+            px,
+            coarser: None,
+            is_final: false,
+        }
+    }
+
+    /// Whether the frame needs no further search after one on this `background`; else with which cells it is
+    /// to be done. `sorted` is a buffer.
+    pub fn is_settled(
+        &mut self,
+        background: &FrameBackground,
+        searched: &Searched,
+        sorted: &mut Vec<f32>,
+    ) -> bool {
+        if self.is_final {
+            return true;
+        }
+        let pass = &searched.pass;
+        let tried = Tried {
+            cell_px: self.px,
+            limit_adu: pass.threshold_level * background.median_sigma_adu / pass.matched_gain,
+        };
+        if let Some(coarser) = self.coarser
+            && tried.limit_adu > WORTHWHILE * coarser.limit_adu
+        {
+            self.px = coarser.cell_px;
+            self.is_final = true;
+            return false;
+        }
+        let finer_px = finer_px(self.px, background, searched, sorted);
+        self.coarser = Some(tried);
+        std::mem::replace(&mut self.px, finer_px) == finer_px
+    }
+}
+
+/// The side of the cells that the bends of a background with cells of `cell_px` ask for.
+fn finer_px(
+    cell_px: usize,
+    background: &FrameBackground,
+    Searched { stars, pass }: &Searched,
+    sorted: &mut Vec<f32>,
+) -> usize {
+    let least_px = LEAST_PX.max((LEAST_PER_SPOT * stars.spot_px).ceil() as usize);
+    let scatter = |bend: f32| bend * RMS_PER_BEND / pass.matched_gain as f32;
+    sorted.clear();
+    sorted.extend(background.mesh.bends_over_noise().map(scatter));
+    let at = (MOST * sorted.len() as f32) as usize;
+    if at >= sorted.len() {
+        return cell_px;
+    }
+    let mut scatter = *sorted.select_nth_unstable_by(at, f32::total_cmp).1;
+    let mut finer_px = cell_px;
+    while scatter > LARGEST_SCATTER && finer_px / 2 >= least_px {
+        finer_px /= 2;
+        // A quarter of the second difference.
+        scatter /= 4.0;
+    }
+    finer_px
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::detect::{DetectConfig, Workspace, detect};
+    use crate::frame::Frame;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const SIDE: usize = 480;
+
+    /// How many of 200 stars are found on a sky of this level.
+    fn found(level: impl Fn(f64, f64) -> f64) -> usize {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut pixels: Vec<f64> = (0..SIDE * SIDE)
+            .map(|index| {
+                let [x, y] = [index % SIDE, index / SIDE].map(|at| at as f64 / SIDE as f64 - 0.5);
+                level(x, y) + 10.0 * random.sample::<f64, _>(StandardNormal)
+            })
+            .collect();
+        for _ in 0..200 {
+            let [x, y] = [(); 2].map(|()| random.random_range(8.0..SIDE as f64 - 8.0));
+            for row in y as usize - 4..y as usize + 6 {
+                for column in x as usize - 4..x as usize + 6 {
+                    let r2 = (column as f64 - x).powi(2) + (row as f64 - y).powi(2);
+                    pixels[row * SIDE + column] += 80.0 * (-0.5 * r2 / 0.8f64.powi(2)).exp();
+                }
+            }
+        }
+        let pixels = pixels.into_iter().map(|pixel| pixel as f32).collect();
+        let frame = Frame::new(SIDE, SIDE, pixels).unwrap();
+        let found = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).unwrap();
+        found.sources.len()
+    }
+
+    #[test]
+    fn a_sky_that_is_bent_hides_no_stars() {
+        let flat = found(|_, _| 600.0);
+        let bent = found(|x, y| 600.0 + 1600.0 * (x * x + y * y));
+        assert!(flat > 190, "{flat}");
+        assert!(bent > 185, "{bent} of {flat}");
+    }
+}
