@@ -2,6 +2,7 @@
 
 use super::IdentifiedFrame;
 use crate::base::neighbors::PointTree;
+use crate::detect::PIXEL_VARIANCE_PX2;
 use crate::identify::{PredictedStar, StarMatch};
 use crate::sky::catalog::StarIndex;
 
@@ -19,8 +20,16 @@ pub(super) struct FrameStar {
     pub detection: Option<usize>,
     /// Whether it is single, well inside the frame, and not hidden.
     pub is_clear: bool,
-    /// Light of undetected neighbors in its flux, over its own.
+    /// Light of undetected neighbors in its flux, over its own; below 0 where there is less of it than in the
+    /// background around.
     pub neighbors_light: f64,
+}
+
+impl FrameStar {
+    /// By how much its undetected neighbors make it brighter, in magnitudes.
+    pub(super) fn brighter_mag(&self) -> f64 {
+        2.5 * libm::log10(1.0 + self.neighbors_light)
+    }
 }
 
 /// Catalog stars and their detections.
@@ -41,7 +50,8 @@ pub(crate) fn resolved_px(spot_sigma_px: f64) -> f64 {
 struct Surroundings {
     /// Whether none of them is bright enough to crowd it.
     is_single: bool,
-    /// Light, in the star's flux and over its own, of those without a detection of their own.
+    /// Light, in the star's flux and over its own, of those without a detection of their own, above what is in the
+    /// background.
     undetected_light: f64,
 }
 
@@ -51,6 +61,67 @@ pub(crate) fn filter_response(distance_sigmas: f64) -> f64 {
     libm::exp(-0.25 * distance_sigmas.powi(2))
 }
 
+/// Light of a star of this magnitude, over that of magnitude 0.
+fn light_of(mag: f32) -> f64 {
+    libm::pow(10.0, -0.4 * f64::from(mag))
+}
+
+/// The light of stars that are too faint to be detected. The background contains its mean.
+struct FaintLight {
+    places: PointTree,
+    /// Of each of them.
+    light: Vec<f64>,
+    /// Within this distance the mean is taken.
+    reach_px: f64,
+    /// Part of the light of the stars within reach that is in a flux, on average.
+    response: f64,
+}
+
+impl FaintLight {
+    /// Of the stars `predicted`, brightest first, where `detections` has none of them.
+    fn of(
+        predicted: &[PredictedStar],
+        detections: &[Option<usize>],
+        width_px: f64,
+        resolved_px: f64,
+    ) -> Self {
+        /// Stars that are not detected are too faint for it if they are fainter than this share of the detected
+        /// ones. Brighter ones are behind clouds, or have no name.
+        const BRIGHTER: f64 = 0.75;
+        /// How far the mean is taken, over the distance at which two stars are resolved.
+        const REACH: f64 = 8.0;
+        let detected = detections.iter().flatten().count() as f64;
+        let mut brighter = 0.0;
+        let is_faint = |(star, detection): (&PredictedStar, &Option<usize>)| {
+            brighter += f64::from(u8::from(detection.is_some()));
+            let is_faint = detection.is_none() && brighter > BRIGHTER * detected;
+            is_faint.then_some(*star)
+        };
+        let faint = predicted.iter().zip(detections).filter_map(is_faint);
+        let faint: Vec<PredictedStar> = faint.collect();
+        let reach_px = REACH * resolved_px;
+        Self {
+            places: PointTree::new(faint.iter().map(|star| star.pixel)),
+            light: faint.iter().map(|star| light_of(star.v_mag)).collect(),
+            reach_px,
+            // The integral of the filter's response, over the area within reach.
+            response: (2.0 * width_px / reach_px).powi(2),
+        }
+    }
+
+    /// Its mean around `star`, over the star's own light.
+    fn over_light_of(&self, star: &PredictedStar) -> f64 {
+        /// Beside more of it no star is measured.
+        const MOST: f64 = 0.5;
+        let mut light = 0.0;
+        self.places
+            .for_each_within(&star.pixel, self.reach_px, |near| {
+                light += self.light[near.index];
+            });
+        (light * self.response / light_of(star.v_mag)).min(MOST)
+    }
+}
+
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
 pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
@@ -58,6 +129,8 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
     let places = PointTree::new(predicted.iter().map(|star| star.pixel));
     let spot_sigma_px = frame.detections.spot_sigma_px;
     let resolved_px = resolved_px(spot_sigma_px);
+    let width_px = (spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
+    let faint_light = FaintLight::of(predicted, &detections, width_px, resolved_px);
     let surroundings = |index: usize, star: &PredictedStar| {
         let mut around = Surroundings {
             is_single: true,
@@ -71,11 +144,11 @@ pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
             let fainter_mag = neighbor.v_mag - star.v_mag;
             around.is_single &= fainter_mag >= CROWDING_MAG;
             if detections[near.index].is_none() {
-                let light = libm::pow(10f64, -0.4 * f64::from(fainter_mag));
-                around.undetected_light +=
-                    light * filter_response(near.distance_px / spot_sigma_px);
+                let response = filter_response(near.distance_px / width_px);
+                around.undetected_light += light_of(fainter_mag) * response;
             }
         });
+        around.undetected_light -= faint_light.over_light_of(star);
         around
     };
     let camera = &frame.identification.camera;
@@ -129,6 +202,8 @@ mod tests {
     use crate::identify::{Identification, SourceIndex};
     use crate::sky::places::StarPlaces;
     use nalgebra::Matrix3;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     const SIDE_PX: f64 = 400.0;
 
@@ -194,8 +269,25 @@ mod tests {
         let found = associated(&stars, &[]);
         // A companion two magnitudes fainter does not crowd the brighter star, but adds its light.
         assert!(found.stars[0].is_clear && !found.stars[1].is_clear);
-        let light = 10f64.powf(-0.8) * (-0.25f64).exp();
+        let light = 10f64.powf(-0.8) * (-0.25 / (1.0 + PIXEL_VARIANCE_PX2)).exp();
         assert!((found.stars[0].neighbors_light - light).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_background_has_the_mean_light_of_faint_stars() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut place = || random.random_range(8.0..SIDE_PX - 8.0);
+        let mut stars: Vec<PredictedStar> = (0..400).map(|_| star(place(), place(), 5.0)).collect();
+        let named: Vec<StarIndex> = stars.iter().map(|star| star.star).take(1).collect();
+        stars.extend((0..8000).map(|_| star(place(), place(), 8.0)));
+        let found = associated(&stars, &named);
+        let light = |star: &FrameStar| star.neighbors_light;
+        let bright = found.stars.iter().filter(|star| star.v_mag < 6.0);
+        let bright: Vec<f64> = bright.map(light).collect();
+        // A spot takes up 4π s² = 13.6 pixels, in which 0.7 of the faint stars have 0.043 of a bright one's light.
+        let mean = bright.iter().sum::<f64>() / bright.len() as f64;
+        assert!(mean.abs() < 0.006, "{mean}");
+        assert!(bright.iter().any(|light| *light < -0.035));
     }
 
     #[test]

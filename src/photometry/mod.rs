@@ -6,7 +6,7 @@
 //!    detection. Those that a detection has the name of are detected.
 //! 2. Bright, single, constant, unsaturated stars give the zero point ([`zero_point`]).
 //! 3. All single stars, detected or not, give the completeness ([`completeness`]) and the limiting
-//!    magnitude, at which half of the stars are detected. The faintest detected star is a poor
+//!    magnitude, at which half of the stars are detected, on a background with its mean of faint stars. The faintest detected star is a poor
 //!    measure of the limit, because it owes its detection to noise.
 //! 4. [`comparison`] compares the results with the stated camera.
 //! 5. [`sky_map`] measures, on demand, the sky at each place of the frame.
@@ -69,7 +69,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
     let clear: Vec<&FrameStar> = stars.iter().filter(|star| star.is_clear).collect();
     let counted = |v_mag: &dyn Fn(&FrameStar) -> f64| {
         let counted = clear.iter().map(|star| CountedStar {
-            v_mag: v_mag(star),
+            v_mag: v_mag(star) - star.brighter_mag(),
             detected: star.detection.is_some(),
         });
         completeness::measure(&counted.collect::<Vec<_>>(), chance)
@@ -122,7 +122,7 @@ fn standard_star(
     const COMPLETE_WIDTHS: f64 = 2.0;
     /// Smallest signal-to-noise ratio where there is no limit.
     const MIN_SNR: f64 = 10.0;
-    /// Largest light of undetected neighbors, which is subtracted, over the star's own.
+    /// Largest light of undetected neighbors that is subtracted, or added, over the star's own.
     const MAX_NEIGHBORS_LIGHT: f64 = 0.1;
     let detection = &frame.detections.sources[star.detection?];
     let is_bright = match &completeness.limit {
@@ -130,7 +130,7 @@ fn standard_star(
         Err(_) => detection.snr >= MIN_SNR,
     };
     let known = sky.catalog().star(star.star);
-    let is_alone = star.neighbors_light < MAX_NEIGHBORS_LIGHT;
+    let is_alone = star.neighbors_light.abs() < MAX_NEIGHBORS_LIGHT;
     let is_fit =
         is_bright && is_alone && detection.flags.has_clean_flux() && is_constant_and_single(known);
     let off_centre_sq = frame

@@ -20,6 +20,8 @@ pub(super) struct SkyStar {
     pub airmass: Option<f64>,
     /// Distance from the frame's centre over that of the edge of the field, squared.
     pub off_centre_sq: f64,
+    /// By how much its undetected neighbors make it brighter, in magnitudes.
+    pub brighter_mag: f64,
     /// Whether it was detected.
     pub is_detected: bool,
     /// Its brightness in the frame, where that is clean.
@@ -58,6 +60,7 @@ pub(super) fn of(
                 bv_mag: known.bv_mag.map(f64::from),
                 airmass: frame.places.airmass(&direction),
                 off_centre_sq: off_centre_sq / edge_sq,
+                brighter_mag: star.brighter_mag(),
                 is_detected: detection.is_some(),
                 measured,
             }

@@ -83,7 +83,7 @@ impl Sky<'_> {
         Some(Witness {
             star,
             cell,
-            relative_mag: -self.clear_sky.dimmer_mag(star, limit_mag),
+            relative_mag: -self.clear_sky.dimmer_mag(star, limit_mag) - star.brighter_mag,
         })
     }
 }
