@@ -1,0 +1,83 @@
+//! The stars by which the clear sky may be measured.
+
+use super::relation::{Unknowns, row_of};
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::units::RAD_PER_DEG;
+use crate::photometry::Measured;
+use crate::photometry::sky_map::stars::SkyStar;
+
+/// A star by which it may be measured.
+pub(super) struct Candidate {
+    pub row: Unknowns,
+    /// V magnitude less the instrumental one.
+    pub offset_mag: f64,
+    /// Standard error of that by its own flux.
+    pub sigma_mag: f64,
+    pub direction: UnitVector<Icrs>,
+    /// The candidate next to it, as long as it is near: clouds dim both.
+    pub neighbor: Option<usize>,
+}
+
+impl Candidate {
+    /// Those among `stars`, of which V magnitudes are about `mean_vmag`.
+    pub fn all_of(stars: &[SkyStar], mean_vmag: f64) -> Vec<Self> {
+        let of = |star| Self::of(star, mean_vmag);
+        let mut all: Vec<Self> = stars.iter().filter_map(of).collect();
+        let neighbors: Vec<Option<usize>> = (0..all.len()).map(|one| neighbor(&all, one)).collect();
+        for (candidate, neighbor) in all.iter_mut().zip(neighbors) {
+            candidate.neighbor = neighbor;
+        }
+        all
+    }
+
+    fn of(star: &SkyStar, mean_vmag: f64) -> Option<Self> {
+        let Measured {
+            instrumental_mag,
+            sigma_mag,
+        } = star.measured?;
+        Some(Self {
+            row: Unknowns::from(row_of(
+                star.airmass,
+                star.off_centre_sq,
+                star.bv_mag,
+                star.v_mag - mean_vmag,
+            )),
+            offset_mag: star.v_mag - instrumental_mag,
+            sigma_mag,
+            direction: star.direction,
+            neighbor: None,
+        })
+    }
+
+    /// By how much it is brighter than a fit says.
+    pub fn residual_mag(&self, unknowns: &Unknowns) -> f64 {
+        self.offset_mag - unknowns.dot(&self.row)
+    }
+
+    /// Its standard error if it were as bright as the fit says.
+    pub fn expected_sigma_mag(&self, unknowns: &Unknowns) -> f64 {
+        self.sigma_mag * libm::pow(10.0, 0.4 * self.residual_mag(unknowns))
+    }
+
+    /// Whether it counts, by the error that it would have.
+    pub fn counts(&self, unknowns: &Unknowns, largest_mag: f64) -> bool {
+        self.expected_sigma_mag(unknowns) < largest_mag
+    }
+}
+
+/// The candidate next to `one`, if it is near: of those that are about as well measured, or better.
+fn neighbor(all: &[Candidate], one: usize) -> Option<usize> {
+    const NEAR_DEG: f64 = 6.0;
+    /// Largest error of the other star, over its own.
+    const MOST: f64 = 2.0;
+    let Candidate {
+        direction,
+        sigma_mag,
+        ..
+    } = &all[one];
+    let is_other = |&other: &usize| other != one && all[other].sigma_mag < MOST * sigma_mag;
+    let cosine = |other: usize| (all[other].direction.dot(direction), other);
+    let others = (0..all.len()).filter(is_other).map(cosine);
+    let (cosine, nearest) = others.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (cosine > libm::cos(NEAR_DEG * RAD_PER_DEG)).then_some(nearest)
+}
