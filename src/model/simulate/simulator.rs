@@ -179,7 +179,13 @@ impl<'a> Simulator<'a> {
         let mag_arcsec2 = self.scenario.conditions.sky.mag_arcsec2();
         let milky_way =
             pointing.and_then(|pointing| MilkyWay::new(&self.scene, pointing, mag_arcsec2));
-        Sky::new(&self.scenario, &self.scene, &self.camera, random).with(milky_way)
+        let zenith = pointing.and_then(|pointing| {
+            let zenith = pointing.places.zenith()?;
+            Some(pointing.icrs_to_camera.apply(zenith))
+        });
+        Sky::new(&self.scenario, &self.scene, &self.camera, random)
+            .under(zenith)
+            .with(milky_way)
     }
 
     fn lights(&self, seed: u64) -> Vec<Light> {

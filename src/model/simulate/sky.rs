@@ -78,6 +78,14 @@ impl<'a> Sky<'a> {
         }
     }
 
+    /// The same, where the zenith is known and not that of the scenario.
+    pub(super) fn under(mut self, zenith: Option<UnitVector<Camera>>) -> Self {
+        if let (Some(altitudes), Some(zenith)) = (&mut self.altitudes, zenith) {
+            altitudes.zenith = zenith;
+        }
+        self
+    }
+
     /// The same with the Milky Way.
     pub(super) fn with(self, milky_way: Option<MilkyWay>) -> Self {
         Self { milky_way, ..self }
@@ -570,6 +578,26 @@ mod tests {
             clouded += usize::from(sky.clouds_mag(&place) > 0.0);
         }
         assert!(clouded > 700, "{clouded}");
+    }
+
+    #[test]
+    fn the_air_is_thinnest_towards_the_zenith() {
+        let scenario = Scenario::of(Preset::NanosatTracker);
+        let scene = Scene {
+            by_altitude: 1.0,
+            ..Scene::default()
+        };
+        let camera = CameraModel::pinhole(400.0, 300.0, 200.0, false);
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let toward = PixelPoint::new(350.0, 200.0);
+        let zenith = camera.direction_of(&toward);
+        let sky = Sky::new(&scenario, &scene, &camera, &mut random).under(zenith);
+        let at_zenith = sky.transmission(&toward);
+        for (x, y) in [(200.0, 150.0), (10.0, 10.0), (390.0, 290.0)] {
+            let place = PixelPoint::new(x, y);
+            assert!(sky.transmission(&place) < at_zenith - 0.01, "{place:?}");
+            assert!(sky.light(&place) > sky.light(&toward), "{place:?}");
+        }
     }
 
     #[test]
