@@ -1,6 +1,7 @@
 //! What the first frames tell of a camera and its night.
 
 use crate::base::coords::{Camera, Horizon, Rotation};
+use crate::base::statistics::median;
 use crate::camera::KnownLens;
 use crate::identify::Identification;
 use crate::lens::{LensFrame, calibrate};
@@ -23,6 +24,7 @@ pub struct Probe {
     mjd: Option<f64>,
     pointing: Option<Rotation<Horizon, Camera>>,
     sigma_rad: f64,
+    spot_sigma_px: Option<f64>,
     clear_sky: Option<ClearSky>,
     site: Option<Site>,
 }
@@ -40,6 +42,7 @@ impl Probe {
             mjd: date.and_then(|date| date.modified_julian_date()),
             pointing: horizon_attitude(found),
             sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
+            spot_sigma_px: solution.spot_sigma_px,
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
             site: solution.site,
         })
@@ -72,6 +75,9 @@ impl NightStart {
     pub fn of(probes: Vec<Probe>, known: Option<Arc<KnownLens>>) -> Self {
         let skies = probes.iter().filter_map(|probe| probe.clear_sky);
         let clear_sky = skies.max_by(|a, b| a.ground_vmag().total_cmp(&b.ground_vmag()));
+        let spots_px = probes.iter().filter_map(|probe| probe.spot_sigma_px);
+        let mut spots_px: Vec<f64> = spots_px.collect();
+        let spot_sigma_px = (!spots_px.is_empty()).then(|| median(&mut spots_px));
         let first = probes
             .iter()
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
@@ -84,6 +90,7 @@ impl NightStart {
                 camera: *lens.camera(),
                 pointing,
                 sigma_rad,
+                spot_sigma_px,
                 clear_sky,
             });
         Self {

@@ -22,6 +22,8 @@ pub struct HeldCamera {
     pub pointing: Rotation<Horizon, Camera>,
     /// Standard error of that about each axis, in radians.
     pub sigma_rad: f64,
+    /// Standard deviation of the spots of its stars, in pixels.
+    pub spot_sigma_px: Option<f64>,
     /// The air and the camera on a clear sky, for frames with too few stars to tell them.
     pub clear_sky: Option<ClearSky>,
 }

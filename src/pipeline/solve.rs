@@ -296,12 +296,12 @@ impl StarSearch<'_, '_> {
         trails
     }
 
-    /// Detects the stars and identifies them; `None` if detection was not done in time.
-    fn run(
+    /// Detects the stars; `None` if that was not done in time.
+    fn detect(
         &mut self,
         config: &DetectConfig,
         clock: &mut Stopwatch,
-    ) -> Result<Option<FoundStars>, DetectError> {
+    ) -> Result<Option<(Detections, Option<RawColor>)>, DetectError> {
         let frame = self.prepared.frame();
         let detected = detect::detect(frame, config, &mut self.workspace.detect);
         clock.lap(Stage::Detect);
@@ -314,6 +314,19 @@ impl StarSearch<'_, '_> {
         let restore = |mosaic| RawColor::restore(mosaic, raw, &mut detections);
         let mosaic = self.mosaic.map(restore);
         clock.lap(Stage::Detect);
+        Ok(Some((detections, mosaic)))
+    }
+
+    /// Detects the stars and identifies them; `None` if detection was not done in time.
+    fn run(
+        &mut self,
+        config: &DetectConfig,
+        clock: &mut Stopwatch,
+    ) -> Result<Option<FoundStars>, DetectError> {
+        let Some((mut detections, mut mosaic)) = self.detect(config, clock)? else {
+            return Ok(None);
+        };
+        let frame = self.prepared.frame();
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
         let (outcome, places) = through_air_or_not(priors.places(), |places| {
@@ -335,6 +348,18 @@ impl StarSearch<'_, '_> {
                 SearchFailure::Interrupted,
             )))
         });
+        if outcome.identification().is_none()
+            && let Some(spot_sigma_px) = context.held.as_ref().and_then(|held| held.spot_sigma_px)
+        {
+            // Behind clouds, what was measured as the size of stars may be that of clouds.
+            let config = DetectConfig {
+                spot_sigma_px: config.spot_sigma_px.or(Some(spot_sigma_px)),
+                ..config.clone()
+            };
+            if let Some(again) = self.detect(&config, clock)? {
+                (detections, mosaic) = again;
+            }
+        }
         Ok(Some(FoundStars {
             detections,
             mosaic,

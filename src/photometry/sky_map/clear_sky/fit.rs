@@ -196,7 +196,7 @@ mod tests {
                 offset_mag: ZERO_POINT_MAG - cloud_mag(index) + noise_mag,
                 sigma_mag: SIGMA_MAG,
                 direction: UnitVector::from_ra_dec(0.1 * index as f64, 0.0),
-                neighbor: (index % 2 == 0).then_some(index + 1),
+                neighbor: index.is_multiple_of(2).then_some(index + 1),
             }
         };
         let candidates: Vec<Candidate> = (0..200).map(candidate).collect();
