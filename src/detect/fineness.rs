@@ -16,7 +16,6 @@ const MOST: f32 = 0.75;
 const LEAST_PER_SPOT: f64 = 16.0;
 /// Least side of a cell, in pixels: with fewer pixels the noise of the background would matter.
 const LEAST_PX: usize = 16;
-
 /// Finer cells count where they lower the limit to this part of it: at edges they make it worse.
 const WORTHWHILE: f64 = 0.95;
 

@@ -90,15 +90,14 @@ impl FaintLight {
         const BRIGHTER: f64 = 0.75;
         /// How far the mean is taken, over the distance at which two stars are resolved.
         const REACH: f64 = 8.0;
-        let detected = detections.iter().flatten().count() as f64;
-        let mut brighter = 0.0;
-        let is_faint = |(star, detection): (&PredictedStar, &Option<usize>)| {
-            brighter += f64::from(u8::from(detection.is_some()));
-            let is_faint = detection.is_none() && brighter > BRIGHTER * detected;
-            is_faint.then_some(*star)
-        };
-        let faint = predicted.iter().zip(detections).filter_map(is_faint);
-        let faint: Vec<PredictedStar> = faint.collect();
+        let is_detected = |&star: &usize| detections[star].is_some();
+        let detected: Vec<usize> = (0..predicted.len()).filter(is_detected).collect();
+        let last = detected.get((BRIGHTER * detected.len() as f64) as usize);
+        let fainter = last.map_or(0..0, |&last| last..predicted.len());
+        let faint: Vec<&PredictedStar> = fainter
+            .filter(|star| !is_detected(star))
+            .map(|star| &predicted[star])
+            .collect();
         let reach_px = REACH * resolved_px;
         Self {
             places: PointTree::new(faint.iter().map(|star| star.pixel)),

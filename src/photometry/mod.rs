@@ -6,8 +6,9 @@
 //!    detection. Those that a detection has the name of are detected.
 //! 2. Bright, single, constant, unsaturated stars give the zero point ([`zero_point`]).
 //! 3. All single stars, detected or not, give the completeness ([`completeness`]) and the limiting
-//!    magnitude, at which half of the stars are detected, on a background with its mean of faint stars. The faintest detected star is a poor
-//!    measure of the limit, because it owes its detection to noise.
+//!    magnitude, at which half of the stars are detected, on a background with its mean of faint
+//!    stars. The faintest detected star is a poor measure of the limit, because it owes its detection
+//!    to noise.
 //! 4. [`comparison`] compares the results with the stated camera.
 //! 5. [`sky_map`] measures, on demand, the sky at each place of the frame.
 //!

@@ -2,8 +2,7 @@
 
 use super::candidate::Candidate;
 use super::relation::Unknowns;
-use crate::base::statistics::{SIGMA_PER_MAD, median};
-use std::f64::consts::TAU;
+use crate::base::statistics::{SIGMA_PER_MAD, median, normal_density};
 
 /// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
 pub(in crate::photometry::sky_map) const MEAN_CLOUD_MAG: f64 = 1.0;
@@ -97,10 +96,7 @@ impl Candidate {
         const UNTRUE_RANGE_MAG: f64 = 6.0;
         let dimmer_mag = -self.residual_mag(unknowns);
         let sigma_mag = errors.of(self.expected_sigma_mag(unknowns));
-        let normal = |off_mag: f64, sigma_mag: f64| {
-            let off = off_mag / sigma_mag;
-            libm::exp(-0.5 * off * off) / (sigma_mag * TAU.sqrt())
-        };
+        let normal = |off_mag: f64, sigma_mag: f64| normal_density(off_mag / sigma_mag) / sigma_mag;
         let of_part = |part: usize| {
             let sigma_mag = libm::hypot(sigma_mag, PART_SIGMA_MAG[part]);
             clouds.shares[part] * normal(dimmer_mag - PART_MAG[part], sigma_mag)
