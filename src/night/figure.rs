@@ -353,7 +353,7 @@ fn draw_keogram(
     time: &TimeAxis,
     top: f64,
 ) {
-    let mag = |row: &NightRow, cell: usize| row.cells.as_ref()?.mag_arcsec2[cell].map(f64::from);
+    let mag = |row: &NightRow, cell: usize| row.cells.as_ref()?.mag_arcsec2[cell].get();
     let values = rows
         .iter()
         .flat_map(|row| cells.iter().filter_map(move |(cell, _)| mag(row, *cell)));

@@ -27,7 +27,7 @@ mod start;
 mod summary;
 
 pub use almanac::Almanac;
-pub use cells::NightCells;
+pub use cells::{Hundredths, NightCells};
 pub use figure::svg;
 pub use hot_pixels::{NightHotPixel, Standouts, hot_pixels};
 pub use moments::{Moment, MomentKind};

@@ -213,8 +213,8 @@ impl<'a> Series<'a> {
         let mut sums = vec![(0.0, 0.0); cells];
         for NightCells { clear, .. } in frames.filter_map(|at| self.rows[at].cells.as_ref()) {
             for (sum, clear) in sums.iter_mut().zip(clear) {
-                if let Some(clear) = clear {
-                    sum.0 += f64::from(1.0 - clear);
+                if let Some(clear) = clear.get() {
+                    sum.0 += 1.0 - clear;
                     sum.1 += 1.0;
                 }
             }

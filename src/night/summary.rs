@@ -174,11 +174,11 @@ fn map(rows: &[NightRow]) -> Vec<MapCell> {
     let of = |(cell, [altitude_deg, azimuth_deg]): (usize, &[f64; 2])| {
         let mut mags: Vec<f64> = cells
             .iter()
-            .filter_map(|cells| cells.mag_arcsec2[cell].map(f64::from))
+            .filter_map(|cells| cells.mag_arcsec2[cell].get())
             .collect();
         let clear: Vec<f64> = cells
             .iter()
-            .filter_map(|cells| cells.clear[cell].map(f64::from))
+            .filter_map(|cells| cells.clear[cell].get())
             .collect();
         let cloudy = clear.iter().filter(|clear| **clear < 0.5).count();
         let darkest = mags.iter().copied().reduce(f64::max);

@@ -4,8 +4,8 @@ use super::rows::json_line;
 use anyhow::{Context, bail};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use std::fs::{File, TryLockError};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 /// A row of a frame.
@@ -14,7 +14,7 @@ pub(crate) trait JournalRow: Serialize + DeserializeOwned {
     fn name(&self) -> String;
 }
 
-/// The file of rows.
+/// The file of rows, locked as long as it is open.
 pub(crate) struct Journal {
     path: PathBuf,
     file: File,
@@ -22,16 +22,25 @@ pub(crate) struct Journal {
 
 impl Journal {
     /// Opens the file of a run over `frames`, and returns it with the rows of the batches of `batch` frames
-    /// that are complete in it. The rest is cut off.
+    /// that are complete in it. The rest is cut off. A file that another run writes is refused.
     pub(crate) fn open<Row: JournalRow>(
         path: &Path,
         frames: &[String],
         batch: usize,
     ) -> anyhow::Result<(Self, Vec<Row>)> {
-        let text = match fs::read(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
-            read => read.with_context(|| format!("reading {}", path.display()))?,
-        };
+        let open = File::options()
+            .create(true)
+            .read(true)
+            .append(true)
+            .open(path);
+        let mut file = open.with_context(|| format!("writing {}", path.display()))?;
+        // Where the file system has no locks, nothing is known of other runs.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            bail!("{}: another run is writing it", path.display());
+        }
+        let mut text = Vec::new();
+        let read = file.read_to_end(&mut text);
+        read.with_context(|| format!("reading {}", path.display()))?;
         let lines = text.split_inclusive(|byte| *byte == b'\n');
         let lines: Vec<&[u8]> = lines.filter(|line| line.ends_with(b"\n")).collect();
         let whole = if lines.len() < frames.len() {
@@ -55,12 +64,8 @@ impl Journal {
             rows.push(row);
         }
         let bytes: usize = lines[..whole].iter().map(|line| line.len()).sum();
-        let open = || {
-            let file = File::options().create(true).append(true).open(path)?;
-            file.set_len(bytes as u64)?;
-            std::io::Result::Ok(file)
-        };
-        let file = open().with_context(|| format!("writing {}", path.display()))?;
+        let cut = file.set_len(bytes as u64);
+        cut.with_context(|| format!("writing {}", path.display()))?;
         let path = path.to_owned();
         Ok((Self { path, file }, rows))
     }
@@ -78,6 +83,7 @@ impl Journal {
 mod tests {
     use super::*;
     use starpipe::night::NightRow;
+    use std::fs;
 
     #[test]
     fn complete_batches_are_kept_and_the_rest_is_cut_off() {
@@ -93,9 +99,13 @@ mod tests {
             [&fs::read(&path).unwrap()[..], b"{\"frame\":"].concat(),
         )
         .unwrap();
+        let second = Journal::open::<NightRow>(&path, &names, 2).err().unwrap();
+        assert!(second.to_string().contains("another run"), "{second}");
+        drop(journal);
         let (mut journal, kept) = Journal::open::<NightRow>(&path, &names, 2).unwrap();
         assert_eq!(kept, rows[..4]);
         journal.add(&rows[4..]).unwrap();
+        drop(journal);
         let (_, all) = Journal::open::<NightRow>(&path, &names, 2).unwrap();
         assert_eq!(all, rows);
         assert!(Journal::open::<NightRow>(&path, &names[1..], 2).is_err());
