@@ -116,6 +116,11 @@ impl Calibration {
         self.dark.is_some()
     }
 
+    /// Level of a calibrated pixel without light, in ADU, where a dark tells it.
+    pub fn dark_level_adu(&self) -> Option<f64> {
+        self.has_dark().then(|| self.level_adu.into())
+    }
+
     /// Whether frames are divided by a flat.
     pub fn has_flat(&self) -> bool {
         self.flat.is_some()

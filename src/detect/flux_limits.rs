@@ -44,6 +44,13 @@ impl FluxLimits {
         }
     }
 
+    /// Multiplies all by `factor`.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        for limit in &mut self.adu {
+            *limit *= factor as f32;
+        }
+    }
+
     /// Forgets them.
     pub(super) fn clear(&mut self) {
         self.parts = [0; 2];

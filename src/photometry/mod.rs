@@ -18,6 +18,7 @@
 //! for stars of medium brightness.
 
 mod association;
+mod color_frame;
 pub mod comparison;
 pub mod completeness;
 mod identified_frame;
@@ -25,6 +26,8 @@ pub mod sky_map;
 pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};
+#[doc(hidden)]
+pub use color_frame::ColorFrame;
 #[doc(hidden)]
 pub use identified_frame::IdentifiedFrame;
 

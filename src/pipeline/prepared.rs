@@ -2,11 +2,13 @@
 
 use crate::detect::{DetectConfig, DetectError};
 use crate::frame::{DefectiveColumn, Frame, MemoryLimit, Mosaic, SaturationFinder};
+use crate::photometry::ColorFrame;
 
 /// A frame as detection sees it. Where nothing is to be done, nothing is copied.
 pub(super) struct Prepared<'a> {
     raw: &'a Frame<'a>,
     masked: Option<Frame<'static>>,
+    mosaic: Option<Mosaic>,
     grey: Option<Frame<'static>>,
     /// The columns that are left out.
     pub defects: Vec<DefectiveColumn>,
@@ -30,6 +32,7 @@ impl<'a> Prepared<'a> {
         let mut prepared = Self {
             raw,
             masked: None,
+            mosaic,
             grey: None,
             defects,
             memory,
@@ -52,6 +55,12 @@ impl<'a> Prepared<'a> {
     /// The frame with its own pixels, without the defective columns.
     pub fn raw(&self) -> &Frame<'_> {
         self.masked.as_ref().unwrap_or(self.raw)
+    }
+
+    /// The raw frame of a color camera.
+    pub fn color(&self) -> Option<ColorFrame<'_>> {
+        let raw = self.raw();
+        self.mosaic.map(|mosaic| ColorFrame { mosaic, raw })
     }
 
     /// The frame that detection sees.

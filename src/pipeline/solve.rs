@@ -191,7 +191,6 @@ fn solve(
     let frame = prepared.frame();
     let mut stage = StarSearch {
         prepared: &prepared,
-        mosaic: input.mosaic,
         priors: &priors,
         context,
         workspace,
@@ -239,6 +238,7 @@ fn solve(
         frame,
         calibration: input.calibration,
         mosaic,
+        color: prepared.color(),
         observation: observation(&outcome, &priors),
         priors,
         places,
@@ -269,7 +269,6 @@ fn solve(
 /// The search for the stars of a frame.
 struct StarSearch<'a, 'c> {
     prepared: &'a Prepared<'a>,
-    mosaic: Option<Mosaic>,
     priors: &'a Priors,
     context: &'a Context<'c>,
     workspace: &'a mut Workspace,
@@ -310,9 +309,8 @@ impl StarSearch<'_, '_> {
             detected => detected?,
         };
         detections.sky_area = self.workspace.detect.sky_area(frame, &detections);
-        let raw = self.prepared.raw();
-        let restore = |mosaic| RawColor::restore(mosaic, raw, &mut detections);
-        let mosaic = self.mosaic.map(restore);
+        let color = self.prepared.color();
+        let mosaic = color.map(|color| RawColor::restore(&color, &mut detections));
         clock.lap(Stage::Detect);
         Ok(Some((detections, mosaic)))
     }

@@ -17,7 +17,7 @@ use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::sky_map::{self, Picture, SkyMap, StatedLimit};
-use crate::photometry::{self, FramePhotometry, IdentifiedFrame};
+use crate::photometry::{self, ColorFrame, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
 use crate::sky::solar_system::moon_and_sun;
@@ -31,6 +31,8 @@ pub(super) struct SolvedFrame<'a> {
     pub calibration: Option<&'a Calibration>,
     /// What follows from the mosaic of a raw color frame.
     pub mosaic: Option<RawColor>,
+    /// The raw frame of a color camera.
+    pub color: Option<ColorFrame<'a>>,
     pub priors: Priors,
     /// Where the catalogue's stars appear.
     pub places: StarPlaces,
@@ -81,11 +83,13 @@ impl SolvedFrame<'_> {
             .map(|(sheet, exposure_s)| {
                 sheet.bias_adu + sheet.dark_current_e_s * exposure_s / sheet.gain_e_per_adu
             });
-        let has_dark = self.calibration.is_some_and(Calibration::has_dark);
+        let by_dark = self.calibration.and_then(Calibration::dark_level_adu);
         let has_flat = self.calibration.is_some_and(Calibration::has_flat);
         let picture = Picture {
             frame: self.frame,
-            dark_adu: if has_dark { Some(0.0) } else { by_camera },
+            flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
+            color: self.color,
+            dark_adu: by_dark.or(by_camera),
             is_flat: has_flat || camera.is_some(),
             moon: self.priors.date.map(|known| {
                 let (moon, _) = moon_and_sun(&known.date, self.priors.site);

@@ -52,6 +52,10 @@ pub struct ZenithReport {
     pub mag_arcsec2: f64,
     /// Its standard error.
     pub sigma_mag: f64,
+    /// B−V, where the filters of a raw color frame tell it.
+    pub bv_mag: Option<f64>,
+    /// Its standard error.
+    pub bv_sigma_mag: Option<f64>,
     /// Luminance, in mcd/m².
     pub luminance_mcd_m2: f64,
     /// V magnitude of the faintest star that the unaided eye sees.
@@ -78,6 +82,10 @@ pub struct SkyCellReport {
     pub mag_arcsec2: Option<f64>,
     /// Its standard error.
     pub sigma_mag: Option<f64>,
+    /// B−V, where the filters of a raw color frame tell it.
+    pub bv_mag: Option<f64>,
+    /// Its standard error.
+    pub bv_sigma_mag: Option<f64>,
     /// Luminance, in mcd/m².
     pub luminance_mcd_m2: Option<f64>,
     /// Stars that a clear sky would show.
@@ -134,6 +142,8 @@ impl ZenithReport {
         Self {
             mag_arcsec2: mag(zenith.light.mag_arcsec2.value),
             sigma_mag: mag(zenith.light.mag_arcsec2.sigma),
+            bv_mag: zenith.light.bv_mag.map(|bv| mag(bv.value)),
+            bv_sigma_mag: zenith.light.bv_mag.map(|bv| mag(bv.sigma)),
             luminance_mcd_m2: mcd_m2(zenith.light.luminance_cd_m2),
             naked_eye_limit_vmag: to_decimals(zenith.naked_eye_limit_vmag, 2),
             bortle: zenith.bortle,
@@ -153,6 +163,7 @@ impl SkyCellReport {
             Place::Frame { x, y } => (None, None, pixels(x), pixels(y)),
         };
         let light = cell.light.as_ref();
+        let color = light.and_then(|light| light.bv_mag);
         let limit = cell.limit_vmag.as_ref();
         let extinction = cell.extinction_mag.as_ref();
         Self {
@@ -163,6 +174,8 @@ impl SkyCellReport {
             solid_angle_sr: significant(cell.solid_angle_sr, DIGITS),
             mag_arcsec2: light.map(|light| mag(light.mag_arcsec2.value)),
             sigma_mag: light.map(|light| mag(light.mag_arcsec2.sigma)),
+            bv_mag: color.map(|bv| mag(bv.value)),
+            bv_sigma_mag: color.map(|bv| mag(bv.sigma)),
             luminance_mcd_m2: light.map(|light| mcd_m2(light.luminance_cd_m2)),
             expected: cell.expected,
             detected: cell.detected,

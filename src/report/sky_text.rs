@@ -9,10 +9,16 @@ impl SkyReport {
     pub(super) fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Some(zenith) = &self.zenith {
+            let color = zenith
+                .bv_mag
+                .zip(zenith.bv_sigma_mag)
+                .map_or_else(String::new, |(mag, sigma)| {
+                    format!("B−V {mag:.2} ± {sigma:.2}, ")
+                });
             lines.push(labelled(
                 "zenith",
                 &format!(
-                    "{:.2} ± {:.2} mag/arcsec² (V), {:.2} mcd/m²; to the eye V {:.1}, Bortle {}",
+                    "{:.2} ± {:.2} mag/arcsec² (V), {color}{:.2} mcd/m²; to the eye V {:.1}, Bortle {}",
                     zenith.mag_arcsec2,
                     zenith.sigma_mag,
                     zenith.luminance_mcd_m2,

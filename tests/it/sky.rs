@@ -19,6 +19,16 @@ const CAMERA: [(&str, &str); 7] = [
     ("aperture_mm", "2"),
     ("spot_sigma_px", "0.9"),
 ];
+/// Its sides.
+const SIDE: u32 = 1200;
+/// Bias, and dark current in 20 s.
+const DARK_ADU: u32 = 18;
+/// Quantum efficiencies behind the filters of a color camera: red, green, blue.
+const FILTERS: [&str; 3] = [
+    "[[400, 0.03], [480, 0.04], [560, 0.08], [580, 0.4], [600, 0.5], [640, 0.4], [700, 0.3], [1000, 0]]",
+    "[[400, 0.03], [460, 0.12], [490, 0.45], [530, 0.8], [560, 0.72], [600, 0.3], [640, 0.12], [1000, 0]]",
+    "[[400, 0.4], [430, 0.6], [460, 0.66], [490, 0.45], [520, 0.18], [560, 0.05], [640, 0.04], [1000, 0]]",
+];
 const EXTINCTION_MAG: f64 = 0.17;
 const SKY_MAG: f64 = 20.5;
 
@@ -103,6 +113,20 @@ fn a_clear_sky_is_as_bright_and_as_clear_as_it_is() {
     let extinction = number(&found, "/extinction_mag_per_airmass");
     assert!((extinction - EXTINCTION_MAG).abs() < 0.02, "{extinction}");
     assert_eq!(found["extinction_measured"], true);
+    // A dark frame tells the level without light as well.
+    let dark = directory.path().join("dark.png");
+    let level = u16::try_from(DARK_ADU).unwrap();
+    image::ImageBuffer::from_pixel(SIDE, SIDE, image::Luma([level]))
+        .save(&dark)
+        .unwrap();
+    let by_dark = sky(&frame, &[format!("--dark={}", dark.display())]);
+    let difference =
+        number(&by_dark, "/zenith/mag_arcsec2") - number(&found, "/zenith/mag_arcsec2");
+    let sigma = number(&by_dark, "/zenith/sigma_mag");
+    assert!(
+        difference.abs() < 2.0 * sigma && sigma < 0.1,
+        "{difference}"
+    );
     // The sky is 0.02 mag brighter over the meter's cone than at the zenith.
     let zenith = number(&found, "/zenith/mag_arcsec2");
     assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
@@ -183,4 +207,61 @@ fn a_narrow_field_without_a_site_is_divided_by_columns_and_rows() {
     // `process` does not measure it.
     let ran = Ran::new(starpipe().args(["process", "--format=json", "fixtures/orion/orion.png"]));
     assert!(ran.reports()[0].get("sky").is_none());
+}
+
+/// The file of the same camera with this quantum efficiency.
+fn behind_filter(camera: &Path, efficiency: &str, name: &str) -> PathBuf {
+    let mut text = fs::read_to_string(camera).unwrap();
+    let start = text.find("quantum_efficiency = [").unwrap();
+    let end = start + text[start..].find("\n]").unwrap() + 2;
+    text.replace_range(start..end, &format!("quantum_efficiency = {efficiency}"));
+    let file = camera.with_file_name(name);
+    fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn a_color_camera_sees_the_same_sky_and_its_color() {
+    let directory = tempfile::tempdir().unwrap();
+    let camera = described(directory.path());
+    let names = ["red.toml", "green.toml", "blue.toml"];
+    let frames = [0, 1, 2].map(|filter| {
+        let camera = behind_filter(&camera, FILTERS[filter], names[filter]);
+        let file = simulated(directory.path(), &camera, &["--force"]);
+        starpipe::frame::read(&file).unwrap()
+    });
+    // Red and blue pixels on one diagonal, green ones on the other.
+    let raw = image::ImageBuffer::from_fn(SIDE, SIDE, |x, y| {
+        let filter = match (x % 2, y % 2) {
+            (0, 0) => 0,
+            (1, 1) => 2,
+            _ => 1,
+        };
+        image::Luma([frames[filter].at(x as usize, y as usize) as u16])
+    });
+    let file = directory.path().join("raw.png");
+    raw.save(&file).unwrap();
+    let green = directory.path().join(names[1]);
+    let options = [
+        format!("--camera={}", green.display()),
+        "--exposure=20".to_owned(),
+    ];
+    let found = sky(&file, &options);
+    let zenith = number(&found, "/zenith/mag_arcsec2");
+    assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
+    // The simulated sky has the color of the Sun, which the air reddens in stars by 0.08 mag.
+    let (color, sigma) = (
+        number(&found, "/zenith/bv_mag"),
+        number(&found, "/zenith/bv_sigma_mag"),
+    );
+    assert!(
+        (color - 0.72).abs() < 2.0 * sigma && sigma < 0.2,
+        "{color} {sigma}"
+    );
+    let high = |cell: &Value| number(cell, "/altitude_deg/0") >= 30.0;
+    let limits = cells(&found, high).filter_map(|cell| {
+        Some(cell["limit_vmag"].as_f64()? - cell["expected_limit_vmag"].as_f64()?)
+    });
+    let difference = mean(limits);
+    assert!(difference.abs() < 0.15, "{difference}");
 }

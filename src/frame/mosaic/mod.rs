@@ -60,9 +60,35 @@ impl Mosaic {
         Some(Self { pattern, green })
     }
 
-    /// Whether the pixel in column `x`, row `y` is one of the two in four that are alike: green.
-    pub fn is_green(&self, x: usize, y: usize) -> bool {
-        Diagonal::of(x, y) == self.green
+    /// Number of filters that differ.
+    pub(crate) const FILTERS: usize = 3;
+
+    /// The filter over the pixel in column `x`, row `y`: 0 for the one that two in four pixels have, green; 1
+    /// for that in even rows beside it, 2 for that in odd rows.
+    pub(crate) fn filter(&self, x: usize, y: usize) -> usize {
+        if Diagonal::of(x, y) == self.green {
+            0
+        } else {
+            1 + y % 2
+        }
+    }
+
+    /// The pixels under a filter that one in four pixels has, as a frame; `None` if none of them has a value.
+    pub(crate) fn pixels_under(&self, filter: usize, raw: &Frame) -> Option<Frame<'static>> {
+        let y0 = filter - 1;
+        let x0 = usize::from(self.filter(0, y0) != filter);
+        let (columns, rows) = ((x0..raw.width).step_by(2), (y0..raw.height).step_by(2));
+        let size = (columns.len(), rows.len());
+        let pixels = rows.flat_map(|y| columns.clone().map(move |x| raw.at(x, y)));
+        let frame = Frame::new(size.0, size.1, pixels.collect()).ok()?;
+        Some(frame.with_levels(raw.step_adu, raw.saturation_adu))
+    }
+
+    /// Standard deviation of a spot in the raw frame, by that in the grey one.
+    pub(crate) fn raw_spot_px(grey_spot_px: f64) -> f64 {
+        (grey_spot_px.powi(2) - Self::ADDED_VARIANCE_PX2)
+            .max(0.0)
+            .sqrt()
     }
 
     /// The grey frame: every pixel has the mean of the filters around it. A pixel is saturated if

@@ -1,7 +1,8 @@
 //! The brightness of the sky: the background above the level without light, over the solid angle of a
 //! pixel, on the zero point of the stars of the same frame.
 
-use super::clear_sky::ClearSky;
+use super::clear_sky::{ClearSky, USUAL_SKY_BV_MAG};
+use super::color::{ColorIndex, SkyColors};
 use super::grid::Grid;
 use super::picture::Picture;
 use crate::base::coords::PixelPoint;
@@ -57,6 +58,8 @@ impl NoBrightness {
 pub struct SkyLight {
     /// V magnitude of a square arcsecond.
     pub mag_arcsec2: Estimate,
+    /// B−V, where the filters of a raw color frame tell it.
+    pub bv_mag: Option<Estimate>,
     /// Luminance, in cd/m².
     pub luminance_cd_m2: f64,
 }
@@ -87,11 +90,13 @@ pub(super) struct CellLevel {
     light: Sum,
 }
 
-/// Light over solid angle.
+/// Light over solid angle; of a sample, too.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
     /// Light of all samples, in ADU.
     light_adu: f64,
+    /// The same behind the two filters that tell the color.
+    filters_adu: [f64; 2],
     /// Their solid angle in the lens's center, in steradians.
     solid_angle_sr: f64,
 }
@@ -102,6 +107,8 @@ pub(super) struct Levels {
     pub cells: Vec<CellLevel>,
     /// Fluxes are over this time.
     pub exposure_s: f64,
+    /// How light behind filters tells its color.
+    color_index: Option<ColorIndex>,
     /// The light about the zenith, weighted as a meter sees it.
     zenith: Sum,
     /// Solid angle about the zenith in the frame, weighted in the same way.
@@ -124,6 +131,7 @@ impl Levels {
         picture: &Picture,
         grid: &Grid,
         clear_sky: &ClearSky,
+        mut colors: Option<SkyColors>,
     ) -> Self {
         /// Places at which the light is measured.
         const SAMPLES: f64 = 60_000.0;
@@ -138,6 +146,7 @@ impl Levels {
         let mut levels = Self {
             cells: vec![CellLevel::default(); grid.places.len()],
             exposure_s: frame.exposure_s.unwrap_or(1.0),
+            color_index: colors.as_ref().map(|colors| colors.index),
             zenith: Sum::default(),
             zenith_sr: 0.0,
         };
@@ -145,6 +154,9 @@ impl Levels {
         let mut background_row = vec![0.0; width];
         for y in (step / 2..height).step_by(step) {
             background.row(y, &mut background_row);
+            if let Some(colors) = &mut colors {
+                colors.set_row(y);
+            }
             for x in (step / 2..width).step_by(step) {
                 let pixel = PixelPoint::new(x as f64, y as f64);
                 let Some(direction) = grid.direction_of(&pixel) else {
@@ -159,11 +171,14 @@ impl Levels {
                 };
                 let airmass = frame.places.airmass(&direction);
                 let off_centre_sq = camera.off_centre_sq(&pixel) / edge_sq;
-                let light_adu = f64::from(background_row[x]) - dark_adu;
-                let seen_sr = pixel_sr * clear_sky.transmission(off_centre_sq);
+                let sample = Sum {
+                    light_adu: picture.flux_scale * (f64::from(background_row[x]) - dark_adu),
+                    filters_adu: colors.as_ref().map_or([0.0; 2], |colors| colors.at(x)),
+                    solid_angle_sr: pixel_sr * clear_sky.transmission(off_centre_sq),
+                };
                 let level = &mut levels.cells[cell];
                 level.solid_angle_sr += pixel_sr * (step * step) as f64;
-                level.light.add(1.0, light_adu, seen_sr);
+                level.light.add(1.0, &sample);
                 let sum = &mut sums[cell];
                 sum.samples += 1.0;
                 sum.off_centre_sq += off_centre_sq;
@@ -173,7 +188,7 @@ impl Levels {
                 sum.limit_adu += limit_adu.unwrap_or(f64::NAN);
                 if let Some(zenith) = frame.places.zenith() {
                     let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
-                    levels.zenith.add(weight, light_adu, seen_sr);
+                    levels.zenith.add(weight, &sample);
                     levels.zenith_sr += weight * pixel_sr * (step * step) as f64;
                 }
             }
@@ -192,6 +207,7 @@ impl Levels {
         let Sum {
             light_adu,
             solid_angle_sr,
+            ..
         } = self.cells[cell].light;
         let radiance = light_adu / solid_angle_sr;
         (radiance.is_finite() && radiance > 0.0).then_some(radiance)
@@ -199,9 +215,7 @@ impl Levels {
 
     /// The brightness of a cell; `None` where it has no light.
     pub(super) fn light(&self, cell: usize, clear_sky: &ClearSky) -> Option<SkyLight> {
-        self.cells[cell]
-            .light
-            .brightness(self.exposure_s, clear_sky)
+        self.brightness(&self.cells[cell].light, clear_sky)
     }
 
     /// The brightness about the zenith; `None` where too little of it is in the frame.
@@ -211,7 +225,7 @@ impl Levels {
         if self.zenith_sr < LEAST_SHARE * meter_solid_angle_sr() {
             return None;
         }
-        let light = self.zenith.brightness(self.exposure_s, clear_sky)?;
+        let light = self.brightness(&self.zenith, clear_sky)?;
         let mag = light.mag_arcsec2.value;
         Some(ZenithSky {
             light,
@@ -219,29 +233,35 @@ impl Levels {
             bortle: bortle(mag),
         })
     }
-}
 
-impl Sum {
-    fn add(&mut self, weight: f64, light_adu: f64, solid_angle_sr: f64) {
-        self.light_adu += weight * light_adu;
-        self.solid_angle_sr += weight * solid_angle_sr;
-    }
-
-    fn brightness(&self, exposure_s: f64, clear_sky: &ClearSky) -> Option<SkyLight> {
-        let square_arcsec = self.solid_angle_sr / RAD_PER_ARCSEC.powi(2);
-        let light = self.light_adu / square_arcsec / exposure_s;
-        if light.is_nan() || light <= 0.0 {
+    fn brightness(&self, light: &Sum, clear_sky: &ClearSky) -> Option<SkyLight> {
+        let square_arcsec = light.solid_angle_sr / RAD_PER_ARCSEC.powi(2);
+        let flux_adu_s = light.light_adu / square_arcsec / self.exposure_s;
+        if flux_adu_s.is_nan() || flux_adu_s <= 0.0 {
             return None;
         }
-        let zero_point = clear_sky.for_sky();
-        let mag = zero_point.value + instrumental_mag(light);
+        let color_index = self.color_index.as_ref();
+        let bv_mag = color_index.and_then(|index| index.of_sky(light.filters_adu));
+        let zero_point = clear_sky.for_sky(bv_mag.unwrap_or(USUAL_SKY_BV_MAG));
+        let mag = zero_point.value + instrumental_mag(flux_adu_s);
         Some(SkyLight {
             mag_arcsec2: Estimate {
                 value: mag,
                 sigma: zero_point.sigma,
             },
+            bv_mag,
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
         })
+    }
+}
+
+impl Sum {
+    fn add(&mut self, weight: f64, sample: &Self) {
+        self.light_adu += weight * sample.light_adu;
+        self.solid_angle_sr += weight * sample.solid_angle_sr;
+        for (sum, light_adu) in self.filters_adu.iter_mut().zip(sample.filters_adu) {
+            *sum += weight * light_adu;
+        }
     }
 }
 

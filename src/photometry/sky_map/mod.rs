@@ -11,7 +11,7 @@
 //!    probability that it is hardly any (`clouds`); so does the light of clouds, where it goes with missing
 //!    stars (`cloud_light`).
 //! 4. The background above the bias, over the solid angle of a pixel, is the sky's brightness
-//!    (`brightness`).
+//!    (`brightness`). In raw frames of color cameras, two filters tell its color (`color`).
 //! 5. The threshold and the extinction of a cell tell how faint its stars should go, and the stars around it
 //!    how faint they go (`limits`).
 //!
@@ -23,6 +23,7 @@ mod brightness;
 mod clear_sky;
 mod cloud_light;
 mod clouds;
+mod color;
 mod depth;
 mod grid;
 mod limits;
@@ -113,7 +114,8 @@ pub fn measure(
         None => ClearSky::of(&stars, picture.is_flat)?,
     };
     let grid = Grid::over(frame);
-    let levels = Levels::of(frame, picture, &grid, &clear_sky);
+    let color = color::SkyColors::of(frame, picture, &stars);
+    let levels = Levels::of(frame, picture, &grid, &clear_sky, color);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
         grid: &grid,

@@ -2,12 +2,17 @@
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::frame::Frame;
+use crate::photometry::ColorFrame;
 
 /// A frame's pixels, and what is known of their light.
 #[doc(hidden)]
 pub struct Picture<'a> {
-    /// The calibrated frame.
+    /// The calibrated frame, without a mosaic.
     pub frame: &'a Frame<'a>,
+    /// What fluxes were multiplied with: levels are as well.
+    pub flux_scale: f64,
+    /// The raw frame of a color camera.
+    pub color: Option<ColorFrame<'a>>,
     /// Level of a pixel without light, in ADU, where it is known.
     pub dark_adu: Option<f64>,
     /// Whether the loss of light towards the corners is known, and was removed or is stated.

@@ -21,10 +21,12 @@
 //! The stars must be chosen by V and not by flux, which would prefer stars that noise or color
 //! makes brighter.
 
+mod color_index;
 mod relation;
 mod standard;
 mod weights;
 
+pub(super) use color_index::ColorIndex;
 pub use standard::ZeroPoint;
 #[doc(hidden)]
 pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor};

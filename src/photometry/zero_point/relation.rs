@@ -113,11 +113,17 @@ impl Relation {
         Some(1 + self.terms.iter().position(|term| *term == wanted)?)
     }
 
-    fn estimate(&self, column: usize) -> Estimate {
+    /// A coefficient: that of 1, and then of each term.
+    pub(super) fn estimate(&self, column: usize) -> Estimate {
         Estimate {
             value: self.coefficients[column],
             sigma: self.covariance[(column, column)].max(0.0).sqrt(),
         }
+    }
+
+    /// The covariance of two of them.
+    pub(super) fn covariance(&self, row: usize, column: usize) -> f64 {
+        self.covariance[(row, column)]
     }
 
     /// Whether the last term is significant (Student's t test).

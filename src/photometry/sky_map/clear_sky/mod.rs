@@ -28,7 +28,7 @@ use relation::{
 };
 
 /// B−V of the sky between stars: 0.6 by moonlight, 0.9 to 1.0 without (Patat 2003, A&A 400, 1183).
-pub(super) const SKY_BV_MAG: Estimate = Estimate {
+pub(super) const USUAL_SKY_BV_MAG: Estimate = Estimate {
     value: 0.8,
     sigma: 0.2,
 };
@@ -92,7 +92,7 @@ impl ClearSky {
         let edge = Unknowns::from(row_of(None, 1.0, None, 0.0))
             - Unknowns::from(row_of(None, 0.0, None, 0.0));
         let extinction_mag = estimate(EXTINCTION);
-        let of_sky = Unknowns::from(row_of(None, 0.0, Some(SKY_BV_MAG.value), 0.0));
+        let of_sky = Unknowns::from(row_of(None, 0.0, Some(USUAL_SKY_BV_MAG.value), 0.0));
         // Stars that scatter more may be behind thin clouds, all of them.
         let doubt_mag = Some(errors.scatter_mag).filter(|scatter| *scatter > CLEAR_SCATTER_MAG);
         let doubt_mag = doubt_mag.unwrap_or(0.0);
@@ -169,15 +169,15 @@ impl ClearSky {
         row.iter().zip(self.unknowns).map(|(a, b)| a * b).sum()
     }
 
-    /// The zero point for the sky's light at the ground, at the frame's centre; the error contains that of the
-    /// sky's color.
-    pub(super) fn for_sky(&self) -> Estimate {
-        let row = row_of(None, 0.0, Some(SKY_BV_MAG.value), 0.0);
-        let off_mag = SKY_BV_MAG.value - REFERENCE_BV_MAG;
+    /// The zero point for the light of a sky of this color at the ground, at the frame's centre; the error
+    /// contains that of the color.
+    pub(super) fn for_sky(&self, bv_mag: Estimate) -> Estimate {
+        let row = row_of(None, 0.0, Some(bv_mag.value), 0.0);
+        let off_mag = bv_mag.value - REFERENCE_BV_MAG;
         let per_mag = self.unknowns[COLOR] + 2.0 * self.unknowns[COLOR_CURVE] * off_mag;
         Estimate {
             value: self.dot(row),
-            sigma: libm::hypot(self.sky_sigma_mag, per_mag * SKY_BV_MAG.sigma),
+            sigma: libm::hypot(self.sky_sigma_mag, per_mag * bv_mag.sigma),
         }
     }
 

@@ -1,0 +1,102 @@
+//! The color of the sky's light: its ratio behind two filters of a raw color frame, as stars show it.
+
+use super::picture::Picture;
+use super::stars::SkyStar;
+use crate::base::statistics::Estimate;
+use crate::detect::BackgroundMap;
+use crate::photometry::zero_point::{self, StandardStar};
+use crate::photometry::{ColorFrame, IdentifiedFrame, instrumental_mag};
+
+/// Side of the cells in which the background behind a filter is measured, in its pixels.
+const MESH_PX: usize = 32;
+
+/// How the light behind two filters tells its color.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ColorIndex(zero_point::ColorIndex);
+
+impl ColorIndex {
+    /// By the colors of stars at the ground.
+    fn of(color: &ColorFrame, stars: &[SkyStar], spot_sigma_px: f64) -> Option<Self> {
+        /// Stars with a larger error, in magnitudes, tell little.
+        const LARGEST_SIGMA_MAG: f64 = 0.25;
+        /// Reddening by the air in B−V, per airmass (Patat et al. 2011, A&A 527, A91).
+        const REDDENING_MAG: f64 = 0.1;
+        let standard = |star: &SkyStar| {
+            let sigma_mag = star.measured?.sigma_mag;
+            if sigma_mag > LARGEST_SIGMA_MAG {
+                return None;
+            }
+            let [_, first, second] = color.fluxes_adu(&star.pixel, spot_sigma_px)?;
+            Some(StandardStar {
+                v_mag: star.v_mag,
+                bv_mag: Some(star.bv_mag? + REDDENING_MAG * star.airmass.unwrap_or(0.0)),
+                instrumental_mag: star.v_mag - ratio_mag([first, second])?,
+                sigma_mag,
+                off_centre_sq: star.off_centre_sq,
+            })
+        };
+        let stars: Vec<StandardStar> = stars.iter().filter_map(standard).collect();
+        zero_point::ColorIndex::of(&stars).map(Self)
+    }
+
+    /// B−V of a sky with this light behind the filters.
+    pub(super) fn of_sky(&self, filters_adu: [f64; 2]) -> Option<Estimate> {
+        /// The sky has lines where stars have none; two filters see less of them than B and V.
+        const LINES_MAG: f64 = 0.1;
+        let found = self.0.bv_mag(ratio_mag(filters_adu)?)?;
+        Some(Estimate {
+            value: found.value,
+            sigma: libm::hypot(found.sigma, LINES_MAG),
+        })
+    }
+}
+
+/// The ratio of two fluxes, in magnitudes.
+fn ratio_mag([first, second]: [f64; 2]) -> Option<f64> {
+    (first > 0.0 && second > 0.0).then(|| instrumental_mag(first / second))
+}
+
+/// The sky behind two filters, row by row.
+pub(super) struct SkyColors {
+    /// How its light tells its color.
+    pub index: ColorIndex,
+    dark_adu: f64,
+    backgrounds: [BackgroundMap; 2],
+    rows: [Vec<f32>; 2],
+}
+
+impl SkyColors {
+    /// Those of a raw color frame whose level without light is known.
+    pub(super) fn of(
+        frame: &IdentifiedFrame,
+        picture: &Picture,
+        stars: &[SkyStar],
+    ) -> Option<Self> {
+        let color = picture.color.as_ref()?;
+        let dark_adu = picture.dark_adu?;
+        let index = ColorIndex::of(color, stars, frame.detections.spot_sigma_px)?;
+        let under = |filter| color.mosaic.pixels_under(filter, color.raw);
+        let frames = [under(1)?, under(2)?];
+        Some(Self {
+            index,
+            dark_adu,
+            rows: frames.each_ref().map(|frame| vec![0.0; frame.width]),
+            backgrounds: frames.map(|frame| BackgroundMap::measure(&frame, MESH_PX)),
+        })
+    }
+
+    /// Goes to a row of the frame.
+    pub(super) fn set_row(&mut self, y: usize) {
+        for (background, row) in self.backgrounds.iter().zip(&mut self.rows) {
+            background.row(y / 2, row);
+        }
+    }
+
+    /// The light behind the filters in a column of this row, in ADU.
+    pub(super) fn at(&self, x: usize) -> [f64; 2] {
+        self.rows.each_ref().map(|row| {
+            let at = (x / 2).min(row.len() - 1);
+            f64::from(row[at]) - self.dark_adu
+        })
+    }
+}
