@@ -1,5 +1,7 @@
 //! The input of the photometry.
 
+use crate::base::coords::PixelPoint;
+use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detections;
 use crate::identify::Identification;
 use crate::sky::places::StarPlaces;
@@ -17,4 +19,21 @@ pub struct IdentifiedFrame<'a> {
     pub exposure_s: Option<f64>,
     /// Share of the light lost in the corners, as far as it is known.
     pub vignetting: f64,
+}
+
+impl IdentifiedFrame<'_> {
+    /// Part of the centre's light that the lens lets through to a place, as far as it is known.
+    pub(super) fn lens_transmission(&self, pixel: &PixelPoint) -> f64 {
+        let off_centre_sq = self.identification.camera.off_centre_sq(pixel);
+        lens_transmission(self.vignetting, off_centre_sq)
+    }
+
+    /// Flux at which half of the stars at a place are detected, in ADU in front of the lens; `None` where nothing
+    /// was searched.
+    pub(super) fn flux_limit_adu(&self, pixel: &PixelPoint) -> Option<f64> {
+        let camera = &self.identification.camera;
+        let size_px = [camera.width_px, camera.height_px];
+        let limit_adu = self.detections.flux_limits.at(pixel, size_px)?;
+        Some(limit_adu / self.lens_transmission(pixel))
+    }
 }

@@ -32,7 +32,6 @@ pub use color_frame::ColorFrame;
 pub use identified_frame::IdentifiedFrame;
 
 use crate::base::statistics::median;
-use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, SkyView};
 use crate::sky::catalog::{Star, StarFlags, StarIndex};
@@ -144,7 +143,7 @@ fn standard_star(
     let Measured {
         instrumental_mag,
         sigma_mag,
-    } = Measured::of(frame, star, detection, off_centre_sq);
+    } = Measured::of(frame, star, detection);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,
         bv_mag: known.bv_mag.map(f64::from),
@@ -165,16 +164,11 @@ struct Measured {
 }
 
 impl Measured {
-    /// That of a detection at this distance from the centre.
-    fn of(
-        frame: &IdentifiedFrame,
-        star: &FrameStar,
-        detection: &Detection,
-        off_centre_sq: f64,
-    ) -> Self {
+    /// That of a detection.
+    fn of(frame: &IdentifiedFrame, star: &FrameStar, detection: &Detection) -> Self {
         let flux_adu = detection.flux_adu
             / (1.0 + star.neighbors_light)
-            / lens_transmission(frame.vignetting, off_centre_sq);
+            / frame.lens_transmission(&detection.position);
         Self {
             instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
             sigma_mag: MAG_PER_RELATIVE / detection.snr,

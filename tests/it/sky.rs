@@ -152,6 +152,25 @@ fn a_clear_sky_is_as_bright_and_as_clear_as_it_is() {
 }
 
 #[test]
+fn what_the_lens_takes_from_the_corners_it_takes_from_the_sky_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let camera = described(directory.path());
+    let even = fs::read_to_string(&camera).unwrap();
+    let [even, dim] = ["", "vignetting = 0.4\n"].map(|more| {
+        fs::write(&camera, format!("{even}{more}")).unwrap();
+        let frame = simulated(directory.path(), &camera, &["--force"]);
+        sky(&frame, &[format!("--camera={}", camera.display())])
+    });
+    let low = |cell: &Value| (10.0..30.0).contains(&number(cell, "/altitude_deg/0"));
+    for (even, dim) in cells(&even, low).zip(cells(&dim, low)) {
+        assert_eq!(even["azimuth_deg"], dim["azimuth_deg"]);
+        let difference = number(dim, "/mag_arcsec2") - number(even, "/mag_arcsec2");
+        // Near the edge of the field 0.2 mag are lost.
+        assert!(difference.abs() < 0.05, "{difference} {even}");
+    }
+}
+
+#[test]
 fn the_limit_to_be_expected_is_that_in_the_air_of_the_frame() {
     let directory = tempfile::tempdir().unwrap();
     let camera = described(directory.path());

@@ -81,7 +81,7 @@ pub struct ZenithSky {
 pub(super) struct CellLevel {
     /// Solid angle of the sky in it, in steradians.
     pub solid_angle_sr: f64,
-    /// Flux at which half of the stars are detected, in ADU.
+    /// Flux at which half of the stars are detected, in ADU in front of the lens.
     pub limit_adu: f64,
     /// Airmass, where the horizon is known.
     pub airmass: Option<f64>,
@@ -174,7 +174,9 @@ impl Levels {
                 let sample = Sum {
                     light_adu: picture.flux_scale * (f64::from(background_row[x]) - dark_adu),
                     filters_adu: colors.as_ref().map_or([0.0; 2], |colors| colors.at(x)),
-                    solid_angle_sr: pixel_sr * clear_sky.transmission(off_centre_sq),
+                    solid_angle_sr: pixel_sr
+                        * clear_sky.transmission(off_centre_sq)
+                        * frame.lens_transmission(&pixel),
                 };
                 let level = &mut levels.cells[cell];
                 level.solid_angle_sr += pixel_sr * (step * step) as f64;
@@ -183,9 +185,7 @@ impl Levels {
                 sum.samples += 1.0;
                 sum.off_centre_sq += off_centre_sq;
                 sum.airmass += airmass.unwrap_or(f64::NAN);
-                let size_px = [camera.width_px, camera.height_px];
-                let limit_adu = frame.detections.flux_limits.at(&pixel, size_px);
-                sum.limit_adu += limit_adu.unwrap_or(f64::NAN);
+                sum.limit_adu += frame.flux_limit_adu(&pixel).unwrap_or(f64::NAN);
                 if let Some(zenith) = frame.places.zenith() {
                     let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
                     levels.zenith.add(weight, &sample);

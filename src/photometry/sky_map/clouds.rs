@@ -144,7 +144,7 @@ impl Sky<'_> {
     fn lit(&self, told: &Told, levels: &Levels, priors: &Priors) -> Option<LitCell> {
         let place = self.grid.pixel_of(told.cell)?;
         let direction = self.grid.direction_of(&place)?;
-        let (camera, zenith) = (self.grid.camera(), self.places.zenith());
+        let (camera, zenith) = (self.grid.camera(), self.frame.places.zenith());
         Some(LitCell {
             cell: told.cell,
             hidden: priors.hidden(&told.ln_likelihoods),

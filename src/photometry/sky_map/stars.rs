@@ -51,7 +51,7 @@ pub(super) fn of(
             });
             let measured = clean
                 .filter(|detection| detection.flux_adu > 0.0)
-                .map(|detection| Measured::of(frame, star, detection, off_centre_sq));
+                .map(|detection| Measured::of(frame, star, detection));
             let direction = frame.places.of(known);
             SkyStar {
                 direction,

@@ -3,11 +3,9 @@
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
 use super::stars::SkyStar;
-use crate::base::coords::{Icrs, UnitVector};
-use crate::detect::Detections;
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::photometry::completeness::CountedStar;
-use crate::photometry::instrumental_mag;
-use crate::sky::places::StarPlaces;
+use crate::photometry::{IdentifiedFrame, instrumental_mag};
 
 /// What is known of the sky before clouds.
 pub(super) struct Sky<'a> {
@@ -19,12 +17,10 @@ pub(super) struct Sky<'a> {
     pub clear_sky: &'a ClearSky,
     /// How faint stars go in each cell.
     pub depths: &'a [Option<f64>],
-    /// Where stars appear.
-    pub places: StarPlaces,
+    /// The frame.
+    pub frame: &'a IdentifiedFrame<'a>,
     /// Where the Moon is, where the date is known.
     pub moon: Option<UnitVector<Icrs>>,
-    /// What was detected.
-    pub detections: &'a Detections,
     /// Fluxes are over this time.
     pub exposure_s: f64,
     /// Probability that a star has a detection by chance.
@@ -57,7 +53,11 @@ impl Sky<'_> {
     /// V magnitude of a star in clear air at the frame's centre and at the typical threshold: for these the
     /// limit of the whole frame is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
-        let limit_adu = self.detections.flux_limits.median()?;
+        let camera = self.grid.camera();
+        let size_px = [camera.width_px, camera.height_px];
+        let transmission = |pixel: &PixelPoint| self.frame.lens_transmission(pixel);
+        let limits = &self.frame.detections.flux_limits;
+        let limit_adu = limits.median_over(size_px, transmission)?;
         let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
         Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
     }
@@ -65,7 +65,7 @@ impl Sky<'_> {
     /// Airmass of the frame's centre, where the horizon is known.
     pub(super) fn center_airmass(&self) -> Option<f64> {
         let center = self.grid.direction_of(&self.grid.camera().centre())?;
-        self.places.airmass(&center)
+        self.frame.places.airmass(&center)
     }
 
     /// The stars in cells whose depth is known.
@@ -76,9 +76,7 @@ impl Sky<'_> {
 
     fn witness<'s>(&self, star: &'s SkyStar) -> Option<Witness<'s>> {
         let cell = self.grid.cell_of(&star.pixel, &star.direction)?;
-        let camera = self.grid.camera();
-        let limits = &self.detections.flux_limits;
-        let limit_adu = limits.at(&star.pixel, [camera.width_px, camera.height_px])?;
+        let limit_adu = self.frame.flux_limit_adu(&star.pixel)?;
         let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
         Some(Witness {
             star,
