@@ -16,7 +16,7 @@ use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
-use crate::photometry::sky_map::{self, Picture, SkyMap, StatedLimit};
+use crate::photometry::sky_map::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
 use crate::photometry::{self, ColorFrame, FramePhotometry, IdentifiedFrame};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
@@ -81,15 +81,17 @@ impl SolvedFrame<'_> {
         let by_camera = camera
             .zip(self.priors.exposure_s)
             .map(|(sheet, exposure_s)| {
-                sheet.bias_adu + sheet.dark_current_e_s * exposure_s / sheet.gain_e_per_adu
+                let dark_adu = sheet.dark_current_e_s * exposure_s / sheet.gain_e_per_adu;
+                DarkLevel::stated(sheet.bias_adu + dark_adu, DarkSource::Camera)
             });
         let by_dark = self.calibration.and_then(Calibration::dark_level_adu);
+        let by_dark = by_dark.map(|adu| DarkLevel::stated(adu, DarkSource::Dark));
         let has_flat = self.calibration.is_some_and(Calibration::has_flat);
         let picture = Picture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
             color: self.color,
-            dark_adu: by_dark.or(by_camera),
+            dark: by_dark.or(by_camera),
             is_flat: has_flat || camera.is_some(),
             moon: self.priors.date.map(|known| {
                 let (moon, _) = moon_and_sun(&known.date, self.priors.site);

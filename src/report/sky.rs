@@ -8,6 +8,8 @@ use serde::Serialize;
 
 /// Significant digits of solid angles, luminances and probabilities.
 const DIGITS: i32 = 4;
+/// Decimals of levels.
+const ADU_DECIMALS: i32 = 3;
 
 /// The sky at each place of a frame. Magnitudes are those of V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,6 +32,12 @@ pub struct SkyReport {
     pub edge_loss_sigma_mag: f64,
     /// Stars that are behind no cloud, by which these were measured.
     pub stars: usize,
+    /// Level of a pixel without light, in ADU, where it is known.
+    pub dark_level_adu: Option<f64>,
+    /// Its standard error.
+    pub dark_level_sigma_adu: Option<f64>,
+    /// What tells it: `dark`, `camera` or `unlit`, the pixels outside the circle of an all-sky lens.
+    pub dark_level_source: Option<&'static str>,
     /// Why no brightness was measured: `bias_unknown` or `not_linear`.
     pub no_brightness: Option<&'static str>,
     /// The brightness at the zenith, as a meter with a field of 20° sees it.
@@ -127,6 +135,13 @@ impl SkyReport {
             edge_loss_mag: mag(clear.edge_loss_mag.value),
             edge_loss_sigma_mag: mag(clear.edge_loss_mag.sigma),
             stars: clear.stars,
+            dark_level_adu: sky
+                .dark
+                .map(|dark| to_decimals(dark.adu.value, ADU_DECIMALS)),
+            dark_level_sigma_adu: sky
+                .dark
+                .map(|dark| to_decimals(dark.adu.sigma, ADU_DECIMALS)),
+            dark_level_source: sky.dark.map(|dark| dark.source.code()),
             no_brightness: sky.no_brightness.map(|why| why.code()),
             no_brightness_text: sky.no_brightness.map(|why| why.text()),
             zenith: sky.zenith.as_ref().map(ZenithReport::new),

@@ -33,6 +33,14 @@ impl SkyReport {
             let text = format!("{bright:.2} to {dark:.2} mag/arcsec² (V) in {cells}");
             lines.push(labelled("sky", &text));
         }
+        if let (Some("unlit"), Some(level), Some(sigma)) = (
+            self.dark_level_source,
+            self.dark_level_adu,
+            self.dark_level_sigma_adu,
+        ) {
+            let text = format!("{level:.1} ± {sigma:.1} ADU, by pixels outside the lens's circle");
+            lines.push(labelled("no light", &text));
+        }
         if let Some(why) = self.no_brightness_text {
             lines.push(labelled("sky", &format!("no brightness: {why}")));
         }

@@ -89,6 +89,8 @@ pub struct Scene {
     pub faintest_vmag: Option<f64>,
     /// Light of the Milky Way's faint stars over what it is; none by default.
     pub milky_way: Option<f64>,
+    /// Light that a lens scatters outside its circle, over the mean of the sky in it.
+    pub stray_light: f64,
 }
 
 impl Default for Scene {
@@ -130,6 +132,7 @@ impl Default for Scene {
             vmag_sigma: 0.0,
             faintest_vmag: None,
             milky_way: None,
+            stray_light: 0.0,
         }
     }
 }
@@ -353,5 +356,10 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         milky_way,
         Limits::NotNegative,
         "light of the Milky Way's faint stars, over what it is (else none)"
+    ),
+    key!(
+        stray_light,
+        Limits::FromTo(0.0, 1.0),
+        "light that an all-sky lens scatters outside its circle, over the mean of the sky in it"
     ),
 ];

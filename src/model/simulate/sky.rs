@@ -32,6 +32,7 @@ pub(super) struct Sky<'a> {
     skyline: Option<Skyline>,
     altitudes: Option<Altitudes>,
     milky_way: Option<MilkyWay>,
+    stray_light: f64,
 }
 
 /// Parts of the light at a place.
@@ -75,6 +76,7 @@ impl<'a> Sky<'a> {
             skyline: Skyline::new(scenario, scene, camera, random.clone()),
             altitudes: (scene.by_altitude > 0.0).then(|| Altitudes::new(scenario, camera)),
             milky_way: None,
+            stray_light: scene.stray_light,
         }
     }
 
@@ -165,6 +167,15 @@ impl<'a> Sky<'a> {
                 *pixel = sky_e * parts.light() * self.lens(&place);
             }
         }
+        self.scatter(image);
+    }
+
+    /// Scatters light to where the lens images nothing.
+    fn scatter(&self, image: &mut ElectronImage) {
+        let lit = || image.pixels().iter().filter(|pixel| **pixel > 0.0);
+        let stray_e = self.stray_light * lit().sum::<f64>() / lit().count().max(1) as f64;
+        let unlit = image.pixels_mut().iter_mut().filter(|pixel| **pixel == 0.0);
+        unlit.for_each(|pixel| *pixel = stray_e);
     }
 
     /// Magnitudes by which clouds dim stars at `place`.

@@ -3,6 +3,7 @@
 
 use super::clear_sky::{ClearSky, USUAL_SKY_BV_MAG};
 use super::color::{ColorIndex, SkyColors};
+use super::dark_level::DarkLevel;
 use super::grid::Grid;
 use super::picture::Picture;
 use crate::base::coords::PixelPoint;
@@ -10,7 +11,7 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::BackgroundMap;
 use crate::model::sensitivity::SkyBrightness;
-use crate::photometry::{IdentifiedFrame, instrumental_mag};
+use crate::photometry::{IdentifiedFrame, MAG_PER_RELATIVE, instrumental_mag};
 use std::f64::consts::PI;
 
 /// Full width at half maximum of what a meter of the sky's brightness sees, in degrees.
@@ -85,15 +86,17 @@ pub(super) struct CellLevel {
     pub limit_adu: f64,
     /// Airmass, where the horizon is known.
     pub airmass: Option<f64>,
-    /// Mean distance from the frame's centre over that of the edge of the field, squared.
-    pub off_centre_sq: f64,
     light: Sum,
 }
 
 /// Light over solid angle; of a sample, too.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
-    /// Light of all samples, in ADU.
+    /// Number of samples.
+    samples: f64,
+    /// Their distances from the frame's centre over that of the edge of the field, squared.
+    off_centre_sq: f64,
+    /// Their light, in ADU.
     light_adu: f64,
     /// The same behind the two filters that tell the color.
     filters_adu: [f64; 2],
@@ -107,6 +110,8 @@ pub(super) struct Levels {
     pub cells: Vec<CellLevel>,
     /// Fluxes are over this time.
     pub exposure_s: f64,
+    /// Error of the level that was subtracted, in ADU.
+    dark_sigma_adu: f64,
     /// How light behind filters tells its color.
     color_index: Option<ColorIndex>,
     /// The light about the zenith, weighted as a meter sees it.
@@ -118,8 +123,6 @@ pub(super) struct Levels {
 /// What the sums of a cell need.
 #[derive(Debug, Clone, Copy, Default)]
 struct CellSums {
-    samples: f64,
-    off_centre_sq: f64,
     airmass: f64,
     limit_adu: f64,
 }
@@ -129,6 +132,7 @@ impl Levels {
     pub(super) fn of(
         frame: &IdentifiedFrame,
         picture: &Picture,
+        dark: Option<&DarkLevel>,
         grid: &Grid,
         clear_sky: &ClearSky,
         mut colors: Option<SkyColors>,
@@ -142,10 +146,11 @@ impl Levels {
         let [least_px, most_px] = MESH_PX;
         let mesh_px = grid.breadth_px().clamp(least_px, most_px) as usize;
         let background = BackgroundMap::measure(picture.frame, mesh_px);
-        let dark_adu = picture.dark_adu.unwrap_or(0.0);
+        let dark_adu = dark.map_or(0.0, |dark| dark.adu.value);
         let mut levels = Self {
             cells: vec![CellLevel::default(); grid.places.len()],
             exposure_s: frame.exposure_s.unwrap_or(1.0),
+            dark_sigma_adu: picture.flux_scale * dark.map_or(0.0, |dark| dark.adu.sigma),
             color_index: colors.as_ref().map(|colors| colors.index),
             zenith: Sum::default(),
             zenith_sr: 0.0,
@@ -172,6 +177,8 @@ impl Levels {
                 let airmass = frame.places.airmass(&direction);
                 let off_centre_sq = camera.off_centre_sq(&pixel) / edge_sq;
                 let sample = Sum {
+                    samples: 1.0,
+                    off_centre_sq,
                     light_adu: picture.flux_scale * (f64::from(background_row[x]) - dark_adu),
                     filters_adu: colors.as_ref().map_or([0.0; 2], |colors| colors.at(x)),
                     solid_angle_sr: pixel_sr
@@ -182,8 +189,6 @@ impl Levels {
                 level.solid_angle_sr += pixel_sr * (step * step) as f64;
                 level.light.add(1.0, &sample);
                 let sum = &mut sums[cell];
-                sum.samples += 1.0;
-                sum.off_centre_sq += off_centre_sq;
                 sum.airmass += airmass.unwrap_or(f64::NAN);
                 sum.limit_adu += frame.flux_limit_adu(&pixel).unwrap_or(f64::NAN);
                 if let Some(zenith) = frame.places.zenith() {
@@ -194,9 +199,9 @@ impl Levels {
             }
         }
         for (level, sum) in levels.cells.iter_mut().zip(sums) {
-            level.off_centre_sq = sum.off_centre_sq / sum.samples;
-            level.limit_adu = sum.limit_adu / sum.samples;
-            let airmass = sum.airmass / sum.samples;
+            let Sum { samples, .. } = level.light;
+            level.limit_adu = sum.limit_adu / samples;
+            let airmass = sum.airmass / samples;
             level.airmass = Some(airmass).filter(|airmass| !airmass.is_nan());
         }
         levels
@@ -242,12 +247,16 @@ impl Levels {
         }
         let color_index = self.color_index.as_ref();
         let bv_mag = color_index.and_then(|index| index.of_sky(light.filters_adu));
-        let zero_point = clear_sky.for_sky(bv_mag.unwrap_or(USUAL_SKY_BV_MAG));
+        let zero_point = clear_sky.for_sky(
+            bv_mag.unwrap_or(USUAL_SKY_BV_MAG),
+            light.mean_off_centre_sq(),
+        );
         let mag = zero_point.value + instrumental_mag(flux_adu_s);
+        let by_dark = light.samples * self.dark_sigma_adu / light.light_adu;
         Some(SkyLight {
             mag_arcsec2: Estimate {
                 value: mag,
-                sigma: zero_point.sigma,
+                sigma: libm::hypot(zero_point.sigma, MAG_PER_RELATIVE * by_dark),
             },
             bv_mag,
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
@@ -255,8 +264,21 @@ impl Levels {
     }
 }
 
+impl CellLevel {
+    /// Mean distance from the frame's centre over that of the edge of the field, squared.
+    pub(super) fn off_centre_sq(&self) -> f64 {
+        self.light.mean_off_centre_sq()
+    }
+}
+
 impl Sum {
+    fn mean_off_centre_sq(&self) -> f64 {
+        self.off_centre_sq / self.samples
+    }
+
     fn add(&mut self, weight: f64, sample: &Self) {
+        self.samples += weight * sample.samples;
+        self.off_centre_sq += weight * sample.off_centre_sq;
         self.light_adu += weight * sample.light_adu;
         self.solid_angle_sr += weight * sample.solid_angle_sr;
         for (sum, light_adu) in self.filters_adu.iter_mut().zip(sample.filters_adu) {
@@ -266,10 +288,10 @@ impl Sum {
 }
 
 /// Why the brightness of a frame cannot be measured.
-pub(super) fn refusal(picture: &Picture, clear_sky: &ClearSky) -> Option<NoBrightness> {
+pub(super) fn refusal(dark: Option<&DarkLevel>, clear_sky: &ClearSky) -> Option<NoBrightness> {
     if clear_sky.has_tone_curve() {
         Some(NoBrightness::NotLinear)
-    } else if picture.dark_adu.is_none() {
+    } else if dark.is_none() {
         Some(NoBrightness::BiasUnknown)
     } else {
         None

@@ -1,5 +1,6 @@
 //! The color of the sky's light: its ratio behind two filters of a raw color frame, as stars show it.
 
+use super::dark_level::DarkLevel;
 use super::picture::Picture;
 use super::stars::SkyStar;
 use crate::base::statistics::Estimate;
@@ -70,10 +71,11 @@ impl SkyColors {
     pub(super) fn of(
         frame: &IdentifiedFrame,
         picture: &Picture,
+        dark: Option<&DarkLevel>,
         stars: &[SkyStar],
     ) -> Option<Self> {
         let color = picture.color.as_ref()?;
-        let dark_adu = picture.dark_adu?;
+        let dark_adu = dark?.adu.value;
         let index = ColorIndex::of(color, stars, frame.detections.spot_sigma_px)?;
         let under = |filter| color.mosaic.pixels_under(filter, color.raw);
         let frames = [under(1)?, under(2)?];

@@ -24,6 +24,7 @@ mod clear_sky;
 mod cloud_light;
 mod clouds;
 mod color;
+mod dark_level;
 mod depth;
 mod grid;
 mod limits;
@@ -35,6 +36,7 @@ mod witnesses;
 pub use brightness::{NoBrightness, SkyLight, ZenithSky};
 pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
+pub use dark_level::{DarkLevel, DarkSource};
 pub use grid::Place;
 #[doc(hidden)]
 pub use grid::{horizon_places, is_wide};
@@ -59,6 +61,8 @@ pub struct SkyMap {
     pub cells: Vec<SkyCell>,
     /// The air without clouds.
     pub clear_sky: ClearSky,
+    /// The level of a pixel without light, where it is known.
+    pub dark: Option<DarkLevel>,
     /// Why no brightness was measured.
     pub no_brightness: Option<NoBrightness>,
     /// The brightness at the zenith, where it is in the frame.
@@ -114,8 +118,12 @@ pub fn measure(
         None => ClearSky::of(&stars, picture.is_flat)?,
     };
     let grid = Grid::over(frame);
-    let color = color::SkyColors::of(frame, picture, &stars);
-    let levels = Levels::of(frame, picture, &grid, &clear_sky, color);
+    // A flat divides unlit pixels by what is no light.
+    let is_raw = !picture.is_flat;
+    let unlit = || DarkLevel::of_unlit_pixels(picture.frame, frame.detections).filter(|_| is_raw);
+    let dark = picture.dark.or_else(unlit);
+    let color = color::SkyColors::of(frame, picture, dark.as_ref(), &stars);
+    let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
         grid: &grid,
@@ -134,7 +142,7 @@ pub fn measure(
         share,
     } = sky.clouds(&witnesses, &levels);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
-    let no_brightness = brightness::refusal(picture, &clear_sky);
+    let no_brightness = brightness::refusal(dark.as_ref(), &clear_sky);
     let light = |cell: usize| match no_brightness {
         None => levels.light(cell, &clear_sky),
         Some(_) => None,
@@ -157,6 +165,7 @@ pub fn measure(
             .is_none()
             .then(|| levels.zenith(&clear_sky))
             .flatten(),
+        dark,
         no_brightness,
         clear_sky,
         cells,

@@ -1,5 +1,6 @@
 //! The pixels in which the sky is measured.
 
+use super::dark_level::DarkLevel;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::frame::Frame;
 use crate::photometry::ColorFrame;
@@ -13,8 +14,8 @@ pub struct Picture<'a> {
     pub flux_scale: f64,
     /// The raw frame of a color camera.
     pub color: Option<ColorFrame<'a>>,
-    /// Level of a pixel without light, in ADU, where it is known.
-    pub dark_adu: Option<f64>,
+    /// Level of a pixel without light, where it is stated.
+    pub dark: Option<DarkLevel>,
     /// Whether the loss of light towards the corners is known, and was removed or is stated.
     pub is_flat: bool,
     /// Where the Moon is, where the date is known.

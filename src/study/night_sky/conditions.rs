@@ -10,7 +10,7 @@ use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
 use crate::sky::solar_system::moon_and_sun;
 use crate::study::validation::ValidationError;
-use rand::Rng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Modified Julian Dates of 2020-01-01 and 2030-01-01.
@@ -26,6 +26,8 @@ const LEVELS: [f64; 2] = [0.03, 0.4];
 const MOST_OF_WELL: f64 = 0.5;
 /// Bias over full scale.
 const BIASES: [f64; 2] = [0.02, 0.06];
+/// Light outside the lens's circle over the mean of the sky.
+const STRAY_LIGHT: [f64; 2] = [0.0, 0.04];
 /// Extinction by the thickest clouds, in magnitudes.
 const CLOUDS_MAG: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 const CLOUD_SHARES: [f64; 2] = [0.1, 0.9];
@@ -63,6 +65,8 @@ pub struct Conditions {
     pub clouds: Clouds,
     /// The Moon.
     pub moon: Moon,
+    /// Light that the lens scatters outside its circle, over the mean of the sky.
+    pub stray_light: f64,
 }
 
 /// Clouds.
@@ -121,8 +125,9 @@ impl Conditions {
         } else {
             Clouds::none(sky_px)
         };
+        let seed = random.random();
         let mut drawn = Self {
-            seed: random.random(),
+            seed,
             mjd: date.modified_julian_date().unwrap_or(f64::NAN),
             roll_deg: between([0.0, 360.0], random),
             sky_mag_arcsec2: between(SKY_MAG_ARCSEC2, random),
@@ -137,6 +142,7 @@ impl Conditions {
                 altitude_deg: almanac.moon_altitude_deg,
                 illuminated: almanac.moon_illuminated,
             },
+            stray_light: between(STRAY_LIGHT, &mut ChaCha8Rng::seed_from_u64(seed)),
         };
         drawn.set_camera(setup, site, random)?;
         Ok(drawn)
@@ -199,6 +205,7 @@ impl Conditions {
         let scene = &mut setup.scene;
         scene.by_altitude = 1.0;
         scene.milky_way = Some(1.0);
+        scene.stray_light = self.stray_light;
         scene.cloud_mag = self.clouds.mag;
         scene.cloud_share = Some(self.clouds.share);
         scene.cloud_size_px = self.clouds.size_px;

@@ -14,6 +14,7 @@ type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 const LARGEST_SIGMAS_MAG: [f64; 3] = [0.1, 0.25, 0.6];
 
 /// A fit to stars in clear air.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
     pub unknowns: Unknowns,
     pub covariance: Covariance,

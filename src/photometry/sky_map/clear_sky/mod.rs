@@ -21,7 +21,7 @@ use crate::base::statistics::Estimate;
 use crate::photometry::Measured;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
 use candidate::Candidate;
-use fit::ClearFit;
+use fit::{ClearFit, Fit};
 use mixture::StarErrors;
 use relation::{
     COLOR, COLOR_CURVE, EXTINCTION, SLOPE, UNKNOWNS, USUAL_EXTINCTION, Unknowns, VIGNETTING, row_of,
@@ -58,11 +58,11 @@ pub struct ClearSky {
     pub has_horizon: bool,
     /// The errors of all stars.
     errors: StarErrors,
-    unknowns: [f64; UNKNOWNS],
+    fit: Fit,
     /// V̄.
     mean_vmag: f64,
-    /// Error of the zero point for the sky's light.
-    sky_sigma_mag: f64,
+    /// What the zero point for the sky's light may be off beyond it.
+    doubt_mag: f64,
 }
 
 impl ClearSky {
@@ -92,10 +92,8 @@ impl ClearSky {
         let edge = Unknowns::from(row_of(None, 1.0, None, 0.0))
             - Unknowns::from(row_of(None, 0.0, None, 0.0));
         let extinction_mag = estimate(EXTINCTION);
-        let of_sky = Unknowns::from(row_of(None, 0.0, Some(USUAL_SKY_BV_MAG.value), 0.0));
         // Stars that scatter more may be behind thin clouds, all of them.
         let doubt_mag = Some(errors.scatter_mag).filter(|scatter| *scatter > CLEAR_SCATTER_MAG);
-        let doubt_mag = doubt_mag.unwrap_or(0.0);
         Self {
             zero_point_vmag: estimate(0),
             extinction_mag,
@@ -111,8 +109,8 @@ impl ClearSky {
             has_horizon,
             errors: *errors,
             mean_vmag,
-            unknowns: fit.unknowns.into(),
-            sky_sigma_mag: libm::hypot(fit.variance(&of_sky).sqrt(), doubt_mag),
+            fit: *fit,
+            doubt_mag: doubt_mag.unwrap_or(0.0),
         }
     }
 
@@ -147,14 +145,14 @@ impl ClearSky {
         off_centre_sq: f64,
         instrumental_mag: f64,
     ) -> f64 {
-        let slope = self.unknowns[SLOPE];
+        let slope = self.fit.unknowns[SLOPE];
         let row = row_of(airmass, off_centre_sq, None, -self.mean_vmag);
         (instrumental_mag + self.dot(row)) / (1.0 - slope)
     }
 
     /// By how many magnitudes a star of this instrumental magnitude would be dimmer than in clear air.
     pub(super) fn dimmer_mag(&self, star: &SkyStar, instrumental_mag: f64) -> f64 {
-        (instrumental_mag - self.instrumental_mag(star)) / (1.0 - self.unknowns[SLOPE])
+        (instrumental_mag - self.instrumental_mag(star)) / (1.0 - self.fit.unknowns[SLOPE])
     }
 
     /// Whether gray levels have a tone curve.
@@ -166,18 +164,20 @@ impl ClearSky {
     }
 
     fn dot(&self, row: [f64; UNKNOWNS]) -> f64 {
-        row.iter().zip(self.unknowns).map(|(a, b)| a * b).sum()
+        row.iter().zip(&self.fit.unknowns).map(|(a, b)| a * b).sum()
     }
 
-    /// The zero point for the light of a sky of this color at the ground, at the frame's centre; the error
-    /// contains that of the color.
-    pub(super) fn for_sky(&self, bv_mag: Estimate) -> Estimate {
-        let row = row_of(None, 0.0, Some(bv_mag.value), 0.0);
+    /// The zero point for the light of a sky of this color at the ground, with what the lens takes at a place
+    /// given back; the error contains that of the color and of the lens.
+    pub(super) fn for_sky(&self, bv_mag: Estimate, off_centre_sq: f64) -> Estimate {
+        let row = |off_centre_sq| row_of(None, off_centre_sq, Some(bv_mag.value), 0.0);
+        let at_place = Unknowns::from(row(off_centre_sq));
+        let variance = self.fit.variance(&at_place);
         let off_mag = bv_mag.value - REFERENCE_BV_MAG;
-        let per_mag = self.unknowns[COLOR] + 2.0 * self.unknowns[COLOR_CURVE] * off_mag;
+        let per_mag = self.fit.unknowns[COLOR] + 2.0 * self.fit.unknowns[COLOR_CURVE] * off_mag;
         Estimate {
-            value: self.dot(row),
-            sigma: libm::hypot(self.sky_sigma_mag, per_mag * bv_mag.sigma),
+            value: self.dot(row(0.0)),
+            sigma: (variance + self.doubt_mag.powi(2) + (per_mag * bv_mag.sigma).powi(2)).sqrt(),
         }
     }
 
@@ -194,7 +194,7 @@ impl ClearSky {
 
     /// What arrives at a place, over what arrives at the centre.
     pub(super) fn transmission(&self, off_centre_sq: f64) -> f64 {
-        let [a, b] = VIGNETTING.map(|unknown| self.unknowns[unknown]);
+        let [a, b] = VIGNETTING.map(|unknown| self.fit.unknowns[unknown]);
         let loss_mag = a * off_centre_sq + b * off_centre_sq * off_centre_sq;
         libm::pow(10.0, -0.4 * loss_mag)
     }
