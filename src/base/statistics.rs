@@ -143,6 +143,23 @@ pub(crate) fn median_and_sigma(values: &mut [f64]) -> (f64, f64) {
     (center, SIGMA_PER_MAD * median(values))
 }
 
+/// The mean of `values` without those that are more than three standard deviations from the median, 0 if there are
+/// none. Whole numbers tell it to a part of their step. Reorders the values.
+pub(crate) fn clipped_mean(values: &mut [f64]) -> f64 {
+    const CLIP_SIGMAS: f64 = 3.0;
+    let center = median(values);
+    let mut distances: Vec<f64> = values.iter().map(|value| (value - center).abs()).collect();
+    // Of few levels more than half may be the same: the next level counts, then.
+    let others = distances.iter().copied().filter(|distance| *distance > 0.0);
+    let least = others.reduce(f64::min).unwrap_or(0.0);
+    let reach = CLIP_SIGMAS * SIGMA_PER_MAD * median(&mut distances).max(least);
+    let near = values
+        .iter()
+        .filter(|value| (**value - center).abs() <= reach);
+    let (sum, count) = near.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.
 pub fn log10_binomial_tail(trials: usize, hits: usize, chance: f64) -> f64 {
     /// With more hits than this, factorials are taken from the gamma function.

@@ -32,6 +32,8 @@ pub struct FrameMetadata {
     pub choice: Option<ImageChoice>,
     /// The mosaic of color filters that the file states. Drivers of grey cameras state one, too.
     pub bayer_pattern: Option<BayerPattern>,
+    /// Level of a pixel without light, in ADU, by pixels of the detector that light does not reach.
+    pub dark_level_adu: Option<f64>,
     /// Values outside their plausible range. They are not used.
     pub ignored: Vec<IgnoredValue>,
     /// What the file leaves open, and how it was read.

@@ -87,11 +87,14 @@ impl SolvedFrame<'_> {
         let by_dark = self.calibration.and_then(Calibration::dark_level_adu);
         let by_dark = by_dark.map(|adu| DarkLevel::stated(adu, DarkSource::Dark));
         let has_flat = self.calibration.is_some_and(Calibration::has_flat);
+        // A flat divides pixels without light by what is no light.
+        let by_frame = self.frame.metadata.dark_level_adu.filter(|_| !has_flat);
+        let by_frame = by_frame.map(|adu| DarkLevel::stated(adu, DarkSource::OpticalBlack));
         let picture = Picture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
             color: self.color,
-            dark: by_dark.or(by_camera),
+            dark: by_dark.or(by_camera).or(by_frame),
             is_flat: has_flat || camera.is_some(),
             moon: self.priors.date.map(|known| {
                 let (moon, _) = moon_and_sun(&known.date, self.priors.site);

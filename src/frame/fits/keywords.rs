@@ -14,6 +14,7 @@
 //!   many programs write the highest value of the image there.
 //! - Filters of a color camera: BAYERPAT or COLORTYP, `RGGB` and the like, for the first row of the
 //!   picture, and shifted by XBAYROFF columns and YBAYROFF rows.
+//! - Pixels without light: BIASSEC ([`overscan`](super::overscan)).
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
 //!
 //! In keywords with a dash an underscore may stand for it: DATE_OBS.
@@ -30,7 +31,7 @@ use crate::sky::observer::Site;
 
 /// Metadata from `headers`; earlier headers have priority.
 pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
-    let keywords = Keywords(headers.collect());
+    let keywords = Keywords::new(headers);
     let mut metadata = FrameMetadata::default();
     metadata.row_order = keywords.row_order(&mut metadata);
     metadata.exposure_s = keywords.exposure_s(&mut metadata);
@@ -58,7 +59,7 @@ pub(super) struct StatedSaturation {
 pub(super) fn saturation<'a>(
     headers: impl Iterator<Item = &'a Header<'a>>,
 ) -> Option<StatedSaturation> {
-    let keywords = Keywords(headers.collect());
+    let keywords = Keywords::new(headers);
     let number = |keyword| keywords.number_of(keyword);
     let stated = |keyword, level_adu| StatedSaturation { keyword, level_adu };
     let saturate = number("SATURATE").map(|level| stated("SATURATE", level));
@@ -86,9 +87,15 @@ impl StatedSaturation {
     }
 }
 
+/// The keywords of several headers.
 pub(super) struct Keywords<'a>(Vec<&'a Header<'a>>);
 
-impl Keywords<'_> {
+impl<'a> Keywords<'a> {
+    /// Those of `headers`; earlier headers have priority.
+    pub(super) fn new(headers: impl Iterator<Item = &'a Header<'a>>) -> Self {
+        Self(headers.collect())
+    }
+
     fn row_order(&self, metadata: &mut FrameMetadata) -> RowOrder {
         const KEYWORD: &str = "ROWORDER";
         let Some(text) = self.text(KEYWORD) else {

@@ -25,6 +25,7 @@ mod header;
 mod image;
 mod keywords;
 mod layout;
+mod overscan;
 mod tiles;
 mod time_scale;
 mod unit;
@@ -69,6 +70,8 @@ pub(super) fn decode(
     metadata.choice = choice;
     metadata.assumed.extend(assumed);
     let mut frame = image.frame(&unit, bytes, account)?;
+    let all = keywords::Keywords::new(headers.into_iter());
+    overscan::take(&mut frame, &all, &mut metadata, account)?;
     if let Some(stated) = keywords::saturation(headers.into_iter()) {
         stated.apply(&mut frame, &mut metadata);
     }

@@ -772,3 +772,21 @@ proptest! {
         let _ = decode(&bytes, NonZeroUsize::new(page));
     }
 }
+
+#[test]
+fn pixels_without_light_tell_their_level_and_have_no_value() {
+    let data = [10, 12, 200, 201, 11, 9, 202, 203, 10, 10, 204, 205];
+    let section = |text: &str| format!("BIASSEC = '{text}'");
+    let with = |text: &str| decode(&image(8, &[4, 3], &[&section(text)], &data), None).unwrap();
+    let frame = with("[1:2,1:3]");
+    let level_adu = frame.metadata.dark_level_adu.unwrap();
+    assert!((level_adu - 10.33).abs() < 0.01, "{level_adu}");
+    let dark: Vec<bool> = frame.values().iter().map(|pixel| pixel.is_nan()).collect();
+    assert_eq!(dark, [true, true, false, false].repeat(3));
+    for wrong in ["[1:5,1:3]", "[1:4,1:3]", "overscan"] {
+        let frame = with(wrong);
+        assert_eq!(frame.metadata.dark_level_adu, None);
+        assert_eq!(frame.metadata.ignored[0].keyword, "BIASSEC");
+        assert!(frame.values().iter().all(|pixel| !pixel.is_nan()));
+    }
+}

@@ -1,7 +1,7 @@
 //! The level of a pixel without light.
 
 use crate::base::coords::PixelPoint;
-use crate::base::statistics::{Estimate, SIGMA_PER_MAD, median};
+use crate::base::statistics::{Estimate, clipped_mean, median};
 use crate::detect::{Circle, Detections};
 use crate::frame::Frame;
 
@@ -23,6 +23,8 @@ pub enum DarkSource {
     Dark,
     /// The camera's description.
     Camera,
+    /// Pixels of the detector that light does not reach.
+    OpticalBlack,
     /// The pixels outside the circle of an all-sky lens.
     Unlit,
 }
@@ -33,6 +35,7 @@ impl DarkSource {
         match self {
             Self::Dark => "dark",
             Self::Camera => "camera",
+            Self::OpticalBlack => "optical_black",
             Self::Unlit => "unlit",
         }
     }
@@ -118,7 +121,6 @@ fn corners(frame: &Frame, circle: &Circle) -> [Vec<f64>; 4] {
 fn level_of(mut pixels: Vec<f64>) -> Option<f64> {
     const MIN_PIXELS: usize = 100;
     const MAX_SAME: f64 = 0.95;
-    const CLIP_SIGMAS: f64 = 3.0;
     if pixels.len() < MIN_PIXELS {
         return None;
     }
@@ -127,20 +129,7 @@ fn level_of(mut pixels: Vec<f64>) -> Option<f64> {
     if same as f64 > MAX_SAME * pixels.len() as f64 {
         return None;
     }
-    let mut distances: Vec<f64> = pixels.iter().map(|pixel| (pixel - middle).abs()).collect();
-    // Of few levels the median distance may be 0: that of a level, then.
-    let mad = median(&mut distances);
-    let least = distances
-        .iter()
-        .copied()
-        .filter(|distance| *distance > 0.0)
-        .fold(f64::MAX, f64::min);
-    let reach = CLIP_SIGMAS * SIGMA_PER_MAD * mad.max(least);
-    let (sum, count) = pixels
-        .iter()
-        .filter(|pixel| (**pixel - middle).abs() <= reach)
-        .fold((0.0, 0.0), |(sum, count), pixel| (sum + pixel, count + 1.0));
-    Some(sum / count)
+    Some(clipped_mean(&mut pixels))
 }
 
 #[cfg(test)]
