@@ -4,6 +4,8 @@
 //!
 //! 1. Frames spread over the night are solved with nothing known. They tell the lens, how the camera stands
 //!    in the sky of its site, and the air without clouds ([`NightStart`]).
+//!    Frames of different exposure tell the level of a pixel without light, where nothing else does
+//!    ([`dark_level()`]).
 //! 2. Each frame is solved from where the camera is held. Its sky is measured, also where its stars are not
 //!    identified: by the attitude that the mount and the date give ([`NightRow`]).
 //! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
@@ -16,6 +18,7 @@
 
 mod almanac;
 mod cells;
+mod dark_level;
 mod departure;
 mod figure;
 mod hot_pixels;
@@ -28,6 +31,7 @@ mod summary;
 
 pub use almanac::Almanac;
 pub use cells::{Hundredths, NightCells};
+pub use dark_level::{FrameLevel, dark_level};
 pub use figure::svg;
 pub use hot_pixels::{NightHotPixel, Standouts, hot_pixels};
 pub use moments::{Moment, MomentKind};

@@ -5,7 +5,7 @@ use crate::base::statistics::median;
 use crate::camera::KnownLens;
 use crate::identify::Identification;
 use crate::lens::{LensFrame, calibrate};
-use crate::photometry::sky_map::ClearSky;
+use crate::photometry::sky_map::{ClearSky, DarkLevel};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
 use crate::sky::observer::Site;
 use std::sync::Arc;
@@ -26,6 +26,7 @@ pub struct Probe {
     sigma_rad: f64,
     spot_sigma_px: Option<f64>,
     clear_sky: Option<ClearSky>,
+    has_dark_level: bool,
     site: Option<Site>,
 }
 
@@ -44,6 +45,7 @@ impl Probe {
             sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
             spot_sigma_px: solution.spot_sigma_px,
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
+            has_dark_level: solution.sky.as_ref().is_none_or(|sky| sky.dark.is_some()),
             site: solution.site,
         })
     }
@@ -66,6 +68,8 @@ pub struct NightStart {
     pub held: Option<HeldCamera>,
     /// Zero point through one airmass in the clearest of the frames, in V.
     pub clear_ground_vmag: Option<f64>,
+    /// Whether frames do not tell the level of a pixel without light.
+    pub lacks_dark_level: bool,
     /// Where it is.
     pub site: Option<Site>,
 }
@@ -82,6 +86,7 @@ impl NightStart {
             .iter()
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
+        let lacks_dark_level = probes.iter().any(|probe| !probe.has_dark_level);
         let site = probes.iter().find_map(|probe| probe.site);
         let lens = known.or_else(|| measured_lens(probes));
         let held = first
@@ -92,12 +97,23 @@ impl NightStart {
                 sigma_rad,
                 spot_sigma_px,
                 clear_sky,
+                dark: None,
             });
         Self {
             lens,
             held,
             clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
+            lacks_dark_level,
             site,
+        }
+    }
+
+    /// The same with a level of a pixel without light for frames that do not tell it.
+    #[must_use]
+    pub fn with_dark_level(&self, dark: Option<DarkLevel>) -> Self {
+        Self {
+            held: self.held.clone().map(|held| HeldCamera { dark, ..held }),
+            ..self.clone()
         }
     }
 

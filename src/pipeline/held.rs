@@ -8,7 +8,7 @@ use crate::detect::Detections;
 use crate::identify::{
     Identification, IndexedCatalog, Priors, SkyRegion, SkyView, SourceIndex, StarMatch,
 };
-use crate::photometry::sky_map::ClearSky;
+use crate::photometry::sky_map::{ClearSky, DarkLevel};
 use crate::sky::places::StarPlaces;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
@@ -26,6 +26,8 @@ pub struct HeldCamera {
     pub spot_sigma_px: Option<f64>,
     /// The air and the camera on a clear sky, for frames with too few stars to tell them.
     pub clear_sky: Option<ClearSky>,
+    /// The level of a pixel without light, for frames that do not tell it.
+    pub dark: Option<DarkLevel>,
 }
 
 /// How far from where it is held the boresight is searched for first.

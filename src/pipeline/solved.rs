@@ -90,11 +90,13 @@ impl SolvedFrame<'_> {
         // A flat divides pixels without light by what is no light.
         let by_frame = self.frame.metadata.dark_level_adu.filter(|_| !has_flat);
         let by_frame = by_frame.map(|adu| DarkLevel::stated(adu, DarkSource::OpticalBlack));
+        let usual = self.context.held.as_ref();
         let picture = Picture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
             color: self.color,
             dark: by_dark.or(by_camera).or(by_frame),
+            usual_dark: usual.and_then(|usual| usual.dark).filter(|_| !has_flat),
             is_flat: has_flat || camera.is_some(),
             moon: self.priors.date.map(|known| {
                 let (moon, _) = moon_and_sun(&known.date, self.priors.site);
@@ -106,7 +108,6 @@ impl SolvedFrame<'_> {
             v_mag: comparison.limit_vmag,
             extinction_mag: -2.5 * libm::log10(comparison.budget.atmosphere_transmission),
         });
-        let usual = self.context.held.as_ref();
         let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
         let measured = |usual| {
             sky_map::measure(

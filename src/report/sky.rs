@@ -36,7 +36,8 @@ pub struct SkyReport {
     pub dark_level_adu: Option<f64>,
     /// Its standard error.
     pub dark_level_sigma_adu: Option<f64>,
-    /// What tells it: `dark`, `camera`, `optical_black` or `unlit`, the pixels outside the circle of an all-sky lens.
+    /// What tells it: `dark`, `camera`, `optical_black`, `unlit` (the pixels outside the circle of an all-sky
+    /// lens), or `exposures` (other frames of the night).
     pub dark_level_source: Option<&'static str>,
     /// Why no brightness was measured: `bias_unknown` or `not_linear`.
     pub no_brightness: Option<&'static str>,

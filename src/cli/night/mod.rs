@@ -1,6 +1,7 @@
 //! `night`: a night of one camera on its mount.
 
 mod args;
+mod dark;
 mod files;
 mod hot;
 mod order;
@@ -42,6 +43,7 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
             is_quiet: arguments.quiet,
         };
         let start = run.start(&names);
+        let start = start.with_dark_level(dark::learn(&run, &names, &start));
         let hot = hot::learn(&run, &names, &start);
         if let Some(pixels) = &hot {
             let list = (

@@ -27,6 +27,8 @@ pub enum DarkSource {
     OpticalBlack,
     /// The pixels outside the circle of an all-sky lens.
     Unlit,
+    /// Frames of different exposure.
+    Exposures,
 }
 
 impl DarkSource {
@@ -37,6 +39,7 @@ impl DarkSource {
             Self::Camera => "camera",
             Self::OpticalBlack => "optical_black",
             Self::Unlit => "unlit",
+            Self::Exposures => "exposures",
         }
     }
 }

@@ -121,7 +121,7 @@ pub fn measure(
     // A flat divides unlit pixels by what is no light.
     let is_raw = !picture.is_flat;
     let unlit = || DarkLevel::of_unlit_pixels(picture.frame, frame.detections).filter(|_| is_raw);
-    let dark = picture.dark.or_else(unlit);
+    let dark = picture.dark.or_else(unlit).or(picture.usual_dark);
     let color = color::SkyColors::of(frame, picture, dark.as_ref(), &stars);
     let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
     let depths = depth::depths(&levels, &clear_sky);

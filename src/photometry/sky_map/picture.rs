@@ -16,6 +16,8 @@ pub struct Picture<'a> {
     pub color: Option<ColorFrame<'a>>,
     /// Level of a pixel without light, where it is stated.
     pub dark: Option<DarkLevel>,
+    /// The same by other frames, where this one does not tell it.
+    pub usual_dark: Option<DarkLevel>,
     /// Whether the loss of light towards the corners is known, and was removed or is stated.
     pub is_flat: bool,
     /// Where the Moon is, where the date is known.
