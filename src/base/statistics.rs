@@ -143,21 +143,14 @@ pub(crate) fn median_and_sigma(values: &mut [f64]) -> (f64, f64) {
     (center, SIGMA_PER_MAD * median(values))
 }
 
-/// The mean of `values` without those that are more than three standard deviations from the median, 0 if there are
-/// none. Whole numbers tell it to a part of their step. Reorders the values.
-pub(crate) fn clipped_mean(values: &mut [f64]) -> f64 {
-    const CLIP_SIGMAS: f64 = 3.0;
-    let center = median(values);
-    let mut distances: Vec<f64> = values.iter().map(|value| (value - center).abs()).collect();
-    // Of few levels more than half may be the same: the next level counts, then.
-    let others = distances.iter().copied().filter(|distance| *distance > 0.0);
-    let least = others.reduce(f64::min).unwrap_or(0.0);
-    let reach = CLIP_SIGMAS * SIGMA_PER_MAD * median(&mut distances).max(least);
-    let near = values
-        .iter()
-        .filter(|value| (**value - center).abs() <= reach);
-    let (sum, count) = near.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    sum / f64::max(count, 1.0)
+/// The median of values that were rounded to a `step`, to a part of it. What is cut off at either end does not
+/// change it. Reorders the values.
+pub(crate) fn median_of_rounded(values: &mut [f64], step: f64) -> f64 {
+    let middle = median(values);
+    let below = values.iter().filter(|value| **value < middle).count() as f64;
+    let same = values.iter().filter(|value| **value == middle).count() as f64;
+    let part = (0.5 * values.len() as f64 - below) / same.max(1.0);
+    middle + step * (part - 0.5)
 }
 
 /// log10 of the probability of `hits` or more successes in `trials` at `chance` each.

@@ -57,23 +57,9 @@ impl FluxLimits {
         self.adu.clear();
     }
 
-    /// The median of those in a frame of this size, each over the `transmission` at its place; `None` where
-    /// nothing was searched.
-    pub(crate) fn median_over(
-        &self,
-        size_px: [f64; 2],
-        transmission: impl Fn(&PixelPoint) -> f64,
-    ) -> Option<f64> {
-        let [columns, rows] = self.parts;
-        let middle =
-            |part: usize, side: f64, parts: usize| (part as f64 + 0.5) / parts as f64 * side - 0.5;
-        let over = |(part, adu): (usize, &f32)| {
-            let (x, y) = (part % columns, part / columns);
-            let place =
-                PixelPoint::new(middle(x, size_px[0], columns), middle(y, size_px[1], rows));
-            f64::from(*adu) / transmission(&place)
-        };
-        let mut limits: Vec<f64> = self.adu.iter().enumerate().map(over).collect();
+    /// Their median; `None` where nothing was searched.
+    pub(crate) fn median(&self) -> Option<f64> {
+        let mut limits: Vec<f64> = self.adu.iter().map(|adu| f64::from(*adu)).collect();
         (!limits.is_empty()).then(|| median(&mut limits))
     }
 

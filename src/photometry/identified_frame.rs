@@ -4,6 +4,7 @@ use crate::base::coords::PixelPoint;
 use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detections;
 use crate::identify::Identification;
+use crate::photometry::comparison::FieldPlace;
 use crate::sky::places::StarPlaces;
 
 /// An identified frame.
@@ -35,5 +36,35 @@ impl IdentifiedFrame<'_> {
         let size_px = [camera.width_px, camera.height_px];
         let limit_adu = self.detections.flux_limits.at(pixel, size_px)?;
         Some(limit_adu / self.lens_transmission(pixel))
+    }
+
+    /// Places all over a wide field whose horizon is known, as far as they show the sky.
+    pub fn places_of_horizon(&self) -> Option<Vec<FieldPlace>> {
+        /// Along each side.
+        const PLACES: usize = 25;
+        /// From one place to the next: any few in a row lie all over the frame.
+        const STEP: usize = 233;
+        let camera = &self.identification.camera;
+        let camera_to_icrs = self.identification.icrs_to_camera.inverse();
+        let airmass = |pixel: &PixelPoint| {
+            let direction = camera_to_icrs.apply(&camera.direction_of(pixel)?);
+            self.places.airmass(&direction)
+        };
+        let central_airmass = airmass(&camera.centre())?;
+        let typical_adu = self.detections.flux_limits.median()?;
+        let offset = |place: usize| (place as f64 + 0.5) / PLACES as f64;
+        let place = |number: usize| {
+            let place = number * STEP % (PLACES * PLACES);
+            let (x, y) = (offset(place % PLACES), offset(place / PLACES));
+            let pixel = PixelPoint::new(x * camera.width_px - 0.5, y * camera.height_px - 0.5);
+            let is_seen = self.detections.shows_sky(&pixel);
+            let limit_adu = self.flux_limit_adu(&pixel).filter(|_| is_seen)?;
+            Some(FieldPlace {
+                brighter_mag: 2.5 * libm::log10(limit_adu / typical_adu),
+                airmass_ratio: airmass(&pixel)? / central_airmass,
+            })
+        };
+        let places: Vec<FieldPlace> = (0..PLACES * PLACES).filter_map(place).collect();
+        (!places.is_empty()).then_some(places)
     }
 }

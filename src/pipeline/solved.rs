@@ -105,7 +105,7 @@ impl SolvedFrame<'_> {
         };
         let frame = self.identified_frame(identification);
         let stated = comparison.map(|comparison| StatedLimit {
-            v_mag: comparison.limit_vmag,
+            v_mag: comparison.central_limit_vmag,
             extinction_mag: -2.5 * libm::log10(comparison.budget.atmosphere_transmission),
         });
         let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
@@ -180,6 +180,9 @@ impl SolvedFrame<'_> {
             noise_adu: self.detections.noise_adu,
             threshold_sigma,
             vignetting: self.stated_vignetting(),
+            places: found
+                .filter(|found| sky_map::is_wide(&found.camera))
+                .and_then(|found| self.identified_frame(found).places_of_horizon()),
             wings: self.detections.wings.map_or(0.0, |wings| wings.share),
             spot_sigma_px: found.map(|_| spot_sigma_px),
             pixel_scale_rad: found.map(|found| 1.0 / found.camera.focal_length_px()),

@@ -2,7 +2,7 @@
 //! ends included (IRAF; NOAO Image Keyword Dictionary).
 
 use super::keywords::Keywords;
-use crate::base::statistics::clipped_mean;
+use crate::base::statistics::median_of_rounded;
 use crate::frame::account::Account;
 use crate::frame::error::FrameError;
 use crate::frame::image::Frame;
@@ -36,7 +36,7 @@ pub(super) fn take(
         return Ok(());
     };
     account.check_image(frame.size(), size_of::<f32>())?;
-    let width = frame.width;
+    let (width, step_adu) = (frame.width, f64::from(frame.step_adu));
     let pixels = frame.values_mut();
     let mut levels = Vec::new();
     for y in section.rows {
@@ -45,7 +45,8 @@ pub(super) fn take(
         }
     }
     levels.retain(|level| !level.is_nan());
-    metadata.dark_level_adu = (!levels.is_empty()).then(|| clipped_mean(&mut levels));
+    metadata.dark_level_adu =
+        (!levels.is_empty()).then(|| median_of_rounded(&mut levels, step_adu));
     Ok(())
 }
 

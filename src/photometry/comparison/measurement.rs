@@ -48,6 +48,8 @@ pub struct FrameMeasurement<'a> {
     pub threshold_sigma: f64,
     /// Share of the light lost in the corners.
     pub vignetting: f64,
+    /// Places all over a wide field whose horizon is known.
+    pub places: Option<Vec<FieldPlace>>,
     /// Light beyond the spots, over that of the spots.
     pub wings: f64,
     /// Standard deviation of a star's spot, in pixels.
@@ -73,6 +75,16 @@ pub struct FrameMeasurement<'a> {
     pub faintest_vmag: Option<f64>,
     /// All catalogue stars in the field, also those fainter than the frame shows.
     pub field: &'a [FieldStar],
+}
+
+/// A place in the field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldPlace {
+    /// By how much a star behind the air must be brighter to be detected than at the typical threshold, in
+    /// magnitudes.
+    pub brighter_mag: f64,
+    /// Its airmass over that of the field's centre.
+    pub airmass_ratio: f64,
 }
 
 /// A catalogue star in the field.

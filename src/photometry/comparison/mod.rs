@@ -5,6 +5,8 @@
 //! 1. The sky brightness comes from the frame itself: its background above the bias, in electrons.
 //! 2. With it, the sensitivity model predicts limiting magnitudes and zero point. The fitted limit
 //!    is compared with the predicted one.
+//!    In wide fields whose horizon is known, it is that of all altitudes, by the airmass and the detection
+//!    threshold of each.
 //! 3. The detector's completeness and the stars in the field give the expected faintest star, which
 //!    is compared with the faintest identified star.
 //! 4. Differences that noise does not explain are reported as [`Contradiction`]s.
@@ -19,7 +21,7 @@ mod measurement;
 pub use contradiction::Contradiction;
 pub use measurement::ObservingSetup;
 #[doc(hidden)]
-pub use measurement::{FieldStar, FrameMeasurement};
+pub use measurement::{FieldPlace, FieldStar, FrameMeasurement};
 
 use super::SUN_BV_MAG;
 use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
@@ -45,6 +47,8 @@ pub struct Comparison {
     /// V magnitude at which this detector finds half of the stars of the color for which the fitted
     /// limit holds.
     pub limit_vmag: f64,
+    /// The same at the centre of the field, with the threshold that is typical of it.
+    pub central_limit_vmag: f64,
     /// V magnitude at which it finds 90 % of the stars.
     pub limit90_vmag: f64,
     /// The expected faintest star among those in the field.
@@ -77,7 +81,12 @@ pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comp
     let typical = median(&mut transmissions.clone());
     let (scenario, zenith_is_known) = scenario(stated, frame, exposure_s, typical);
     let budget = Budget::new(&scenario);
-    let detector = detector(frame, &scenario, &budget, &transmissions, typical);
+    let central = central_detector(frame, &scenario, &budget);
+    let differences_mag = match &frame.places {
+        Some(places) => differences_by_air(places, &budget),
+        None => differences_by_lens(&budget, &transmissions, typical),
+    };
+    let detector = central.clone().over(&differences_mag);
     let peak = Detector::new(Rule::PeakPixel, &scenario, &budget);
     let colors = frame.zero_point_colors;
     let zero_point_vmag = expected_zero_point_vmag(&scenario, colors, frame.has_color_term);
@@ -103,6 +112,7 @@ pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comp
         zenith_is_known,
         peak_limit_vmag: peak.vmag_at(0.5),
         limit_vmag,
+        central_limit_vmag: central.vmag_at(0.5) + color_mag,
         limit90_vmag: detector.vmag_at(0.9) + color_mag,
         zero_point_vmag,
         sky_camera_mag_arcsec2,
@@ -155,15 +165,8 @@ fn scenario(
     (scenario, zenith_deg.is_some())
 }
 
-/// The detector with the frame's own threshold and noise, on average over the field, with the parts
-/// of the centre's light that arrive there and their median.
-fn detector(
-    frame: &FrameMeasurement,
-    scenario: &Scenario,
-    budget: &Budget,
-    transmissions: &[f64],
-    typical: f64,
-) -> Detector {
+/// The detector with the frame's own threshold and noise, at the centre of the field.
+fn central_detector(frame: &FrameMeasurement, scenario: &Scenario, budget: &Budget) -> Detector {
     let noise_e = frame.noise_adu * scenario.camera.gain_e_per_adu;
     // A frame without light has no threshold.
     let detector = match frame.threshold_sigma > 0.0 {
@@ -175,6 +178,12 @@ fn detector(
     };
     // The filter sees the spots alone.
     let wings_mag = -2.5 * libm::log10(1.0 + frame.wings);
+    detector.over(&[wings_mag])
+}
+
+/// By how many magnitudes limits over the field differ from that of its centre, with the parts of the centre's
+/// light that arrive there and their median.
+fn differences_by_lens(budget: &Budget, transmissions: &[f64], typical: f64) -> Vec<f64> {
     // Where less light arrives, the sky's noise is smaller, too.
     let noise_where = |transmission: f64| {
         let sky_variance_e2 = transmission * budget.background_e;
@@ -183,9 +192,17 @@ fn detector(
     let typical_noise_e = noise_where(typical);
     let difference_mag = |&part: &f64| {
         let signal_to_noise = part * typical_noise_e / noise_where(part);
-        wings_mag + 2.5 * libm::log10(signal_to_noise.max(1e-6))
+        2.5 * libm::log10(signal_to_noise.max(1e-6))
     };
-    detector.over(&transmissions.iter().map(difference_mag).collect::<Vec<_>>())
+    transmissions.iter().map(difference_mag).collect()
+}
+
+/// The same by the thresholds of places, and the air.
+fn differences_by_air(places: &[FieldPlace], budget: &Budget) -> Vec<f64> {
+    let central_mag = -2.5 * libm::log10(budget.atmosphere_transmission);
+    let difference_mag =
+        |place: &FieldPlace| -place.brighter_mag - central_mag * (place.airmass_ratio - 1.0);
+    places.iter().map(difference_mag).collect()
 }
 
 /// Part of the centre's light that arrives, at places all over the frame.

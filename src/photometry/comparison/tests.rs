@@ -27,6 +27,7 @@ fn measured(sky_mag_arcsec2: f64) -> FrameMeasurement<'static> {
         noise_adu: budget.background_noise_e / sheet.gain_e_per_adu,
         threshold_sigma: 5.0,
         vignetting: 0.0,
+        places: None,
         wings: 0.0,
         spot_sigma_px: Some(1.16),
         pixel_scale_rad: Some(sheet.pixel_scale_rad()),

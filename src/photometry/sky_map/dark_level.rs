@@ -1,7 +1,7 @@
 //! The level of a pixel without light.
 
 use crate::base::coords::PixelPoint;
-use crate::base::statistics::{Estimate, clipped_mean, median};
+use crate::base::statistics::{Estimate, median, median_of_rounded};
 use crate::detect::{Circle, Detections};
 use crate::frame::Frame;
 
@@ -70,8 +70,9 @@ fn of_unlit(frame: &Frame, circle: &Circle, sky_adu: f64) -> Option<DarkLevel> {
     };
     /// Corners at least, of four.
     const MIN_CORNERS: usize = 3;
-    let levels = corners(frame, circle);
-    let mut levels: Vec<f64> = levels.into_iter().filter_map(level_of).collect();
+    let level = |pixels| level_of(pixels, frame.step_adu.into());
+    let corners = corners(frame, circle).into_iter();
+    let mut levels: Vec<f64> = corners.filter_map(level).collect();
     if levels.len() < MIN_CORNERS {
         return None;
     }
@@ -119,9 +120,9 @@ fn corners(frame: &Frame, circle: &Circle) -> [Vec<f64>; 4] {
     corners
 }
 
-/// The mean level of a corner, without what sticks out. `None` for few pixels, and where nearly all are the same,
+/// The level of a corner. `None` for few pixels, and where nearly all are the same,
 /// as where a program drew a mask.
-fn level_of(mut pixels: Vec<f64>) -> Option<f64> {
+fn level_of(mut pixels: Vec<f64>, step_adu: f64) -> Option<f64> {
     const MIN_PIXELS: usize = 100;
     const MAX_SAME: f64 = 0.95;
     if pixels.len() < MIN_PIXELS {
@@ -132,7 +133,7 @@ fn level_of(mut pixels: Vec<f64>) -> Option<f64> {
     if same as f64 > MAX_SAME * pixels.len() as f64 {
         return None;
     }
-    Some(clipped_mean(&mut pixels))
+    Some(median_of_rounded(&mut pixels, step_adu))
 }
 
 #[cfg(test)]
@@ -157,7 +158,8 @@ mod tests {
             (level + noise * deviate).round() as f32
         };
         let pixels = (0..side * side).map(pixel).collect();
-        (Frame::new(side, side, pixels).unwrap(), circle)
+        let frame = Frame::new(side, side, pixels).unwrap();
+        (frame.with_levels(1.0, None), circle)
     }
 
     #[test]
@@ -169,6 +171,17 @@ mod tests {
             assert!((found.value - expected).abs() < 0.2, "{found:?}");
             assert!((3.9..4.5).contains(&found.sigma), "{found:?}");
         }
+    }
+
+    #[test]
+    fn noise_that_is_cut_off_at_zero_does_not_matter() {
+        let (frame, circle) = frame(|_, _| 4.3, 6.0);
+        let cut = frame.values().iter().map(|pixel| pixel.max(0.0)).collect();
+        let cut = Frame::new(frame.width, frame.height, cut).unwrap();
+        let found = of_unlit(&cut.with_levels(1.0, None), &circle, 4.3)
+            .unwrap()
+            .adu;
+        assert!((found.value - 4.3).abs() < 0.3, "{found:?}");
     }
 
     #[test]

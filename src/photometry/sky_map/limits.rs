@@ -1,5 +1,5 @@
 //! How faint stars go at each place, and how faint they should go: by the threshold there, and the limit of
-//! the whole frame by the camera's description, or without one that of the clear parts of the frame.
+//! the centre by the camera's description, or without one that of the clear parts of the frame.
 
 use super::clouds::CellClouds;
 use super::witnesses::{Sky, Witness};
@@ -15,7 +15,7 @@ pub(super) struct CellLimits {
     pub measured_vmag: Option<Estimate>,
 }
 
-/// The limit of a whole frame by the camera's description.
+/// The limit at the centre of a frame with the threshold that is typical of it, by the camera's description.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy)]
 pub struct StatedLimit {

@@ -3,7 +3,7 @@
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
 use super::stars::SkyStar;
-use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::base::coords::{Icrs, UnitVector};
 use crate::photometry::completeness::CountedStar;
 use crate::photometry::{IdentifiedFrame, instrumental_mag};
 
@@ -51,13 +51,9 @@ impl Witness<'_> {
 
 impl Sky<'_> {
     /// V magnitude of a star in clear air at the frame's centre and at the typical threshold: for these the
-    /// limit of the whole frame is predicted. `None` where nothing was searched.
+    /// limit is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
-        let camera = self.grid.camera();
-        let size_px = [camera.width_px, camera.height_px];
-        let transmission = |pixel: &PixelPoint| self.frame.lens_transmission(pixel);
-        let limits = &self.frame.detections.flux_limits;
-        let limit_adu = limits.median_over(size_px, transmission)?;
+        let limit_adu = self.frame.detections.flux_limits.median()?;
         let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
         Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
     }
