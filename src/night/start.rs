@@ -101,9 +101,9 @@ impl NightStart {
             });
         Self {
             lens,
+            lacks_dark_level: lacks_dark_level && held.is_some(),
             held,
             clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
-            lacks_dark_level,
             site,
         }
     }

@@ -1,13 +1,9 @@
 //! Hot pixels of a night.
 
+use super::read::of_each;
 use super::run::Run;
-use crate::cli::batch::for_each_ordered;
-use crate::cli::input::frames::read_frame;
 use crate::cli::output::rows::csv_table;
-use starpipe::frame::Buffers;
 use starpipe::night::{NightHotPixel, NightStart, Standouts, hot_pixels, probe_order};
-use std::ops::ControlFlow;
-use std::path::Path;
 
 /// Frames that are looked at.
 const FRAMES: usize = 12;
@@ -16,28 +12,12 @@ const FRAMES: usize = 12;
 pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<Vec<NightHotPixel>> {
     let order = probe_order(names.len());
     let chosen: Vec<&String> = order.iter().take(FRAMES).map(|at| &names[*at]).collect();
-    let read = |name: &&String, (): &mut ()| {
-        let mut buffers = Buffers::new();
-        buffers.set_memory(run.plan.memory);
-        // Frames that cannot be read are reported with their rows.
-        let frame = read_frame(Path::new(name), None, &mut buffers).ok()?;
-        let mjd = frame
-            .metadata
-            .date
-            .and_then(|date| date.modified_julian_date());
+    let standouts = of_each(&chosen, run.pool, run.plan.memory, |_, frame| {
+        let date = frame.metadata.date;
+        let mjd = date.and_then(|date| date.modified_julian_date());
         Some(Standouts::of(&frame.into_stored(), mjd))
-    };
-    let mut found = Vec::new();
-    for_each_ordered(
-        run.pool,
-        &chosen,
-        || (),
-        read,
-        |_, standouts| {
-            found.extend(standouts);
-            ControlFlow::Continue(())
-        },
-    );
+    });
+    let found: Vec<Standouts> = standouts.into_iter().flatten().collect();
     hot_pixels(&found, start.held.as_ref(), start.site)
 }
 

@@ -6,6 +6,7 @@ mod files;
 mod hot;
 mod order;
 mod page;
+mod read;
 mod run;
 mod text;
 

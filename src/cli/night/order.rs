@@ -1,10 +1,8 @@
 //! The frames of a night in the order of their dates.
 
-use crate::cli::batch::for_each_ordered;
-use crate::cli::input::frames::read_frame;
+use super::read::of_each;
 use starpipe::base::epoch::ObservationDate;
-use starpipe::frame::{Buffers, MemoryLimit};
-use std::ops::ControlFlow;
+use starpipe::frame::MemoryLimit;
 use std::path::Path;
 
 /// Sorts `names` by their dates: those in the names, if all have one with its time, else those of the
@@ -34,28 +32,13 @@ fn seconds(date: Option<&ObservationDate>) -> Option<f64> {
     Some(date?.seconds_since_j2000()?.0)
 }
 
-/// The dates in the files, or in the names where these have none. Frames that cannot be read have none: why
-/// is said when they are solved.
+/// The dates in the files, or in the names where these have none.
 fn in_headers(names: &[String], pool: &rayon::ThreadPool, memory: MemoryLimit) -> Vec<Option<f64>> {
-    let buffers = || {
-        let mut buffers = Buffers::new();
-        buffers.set_memory(memory);
-        buffers
-    };
-    let read = |name: &String, buffers: &mut Buffers| {
-        let path = Path::new(name);
-        let frame = read_frame(path, None, buffers).ok()?;
+    of_each(names, pool, memory, |path, frame| {
         let date = frame.metadata.date;
-        buffers.recycle(frame);
         seconds(
             date.or_else(|| ObservationDate::in_file_name(path))
                 .as_ref(),
         )
-    };
-    let mut dates = Vec::with_capacity(names.len());
-    for_each_ordered(pool, names, buffers, read, |_, date| {
-        dates.push(date);
-        ControlFlow::Continue(())
-    });
-    dates
+    })
 }
