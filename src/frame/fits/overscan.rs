@@ -1,4 +1,4 @@
-//! The pixels that no light reaches, which a header names: BIASSEC = '[x1:x2,y1:y2]', counted from 1, both
+//! The pixels that no light reaches, which a header names: `BIASSEC = '[x1:x2,y1:y2]'`, counted from 1, both
 //! ends included (IRAF; NOAO Image Keyword Dictionary).
 
 use super::keywords::Keywords;
