@@ -111,14 +111,9 @@ impl Calibration {
         Self { mask, ..self }
     }
 
-    /// Whether a dark is subtracted from frames.
-    pub fn has_dark(&self) -> bool {
-        self.dark.is_some()
-    }
-
     /// Level of a calibrated pixel without light, in ADU, where a dark tells it.
     pub fn dark_level_adu(&self) -> Option<f64> {
-        self.has_dark().then(|| self.level_adu.into())
+        self.dark.as_ref().map(|_| self.level_adu.into())
     }
 
     /// Whether frames are divided by a flat.

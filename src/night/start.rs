@@ -110,10 +110,10 @@ impl NightStart {
 
     /// The same with a level of a pixel without light for frames that do not tell it.
     #[must_use]
-    pub fn with_dark_level(&self, dark: Option<DarkLevel>) -> Self {
+    pub fn with_dark_level(self, dark: Option<DarkLevel>) -> Self {
         Self {
-            held: self.held.clone().map(|held| HeldCamera { dark, ..held }),
-            ..self.clone()
+            held: self.held.map(|held| HeldCamera { dark, ..held }),
+            ..self
         }
     }
 

@@ -45,9 +45,8 @@ impl IdentifiedFrame<'_> {
         /// From one place to the next: any few in a row lie all over the frame.
         const STEP: usize = 233;
         let camera = &self.identification.camera;
-        let camera_to_icrs = self.identification.icrs_to_camera.inverse();
         let airmass = |pixel: &PixelPoint| {
-            let direction = camera_to_icrs.apply(&camera.direction_of(pixel)?);
+            let direction = self.identification.apparent_direction_of(pixel)?;
             self.places.airmass(&direction)
         };
         let central_airmass = airmass(&camera.centre())?;

@@ -44,7 +44,8 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
             is_quiet: arguments.quiet,
         };
         let start = run.start(&names);
-        let start = start.with_dark_level(dark::learn(&run, &names, &start));
+        let dark = dark::learn(&run, &names, &start);
+        let start = start.with_dark_level(dark);
         let hot = hot::learn(&run, &names, &start);
         if let Some(pixels) = &hot {
             let list = (

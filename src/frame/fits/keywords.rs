@@ -29,9 +29,8 @@ use crate::frame::metadata::{
 use crate::frame::{BayerPattern, Frame, RowOrder};
 use crate::sky::observer::Site;
 
-/// Metadata from `headers`; earlier headers have priority.
-pub(super) fn metadata<'a>(headers: impl Iterator<Item = &'a Header<'a>>) -> FrameMetadata {
-    let keywords = Keywords::new(headers);
+/// Metadata from `keywords`.
+pub(super) fn metadata(keywords: &Keywords) -> FrameMetadata {
     let mut metadata = FrameMetadata::default();
     metadata.row_order = keywords.row_order(&mut metadata);
     metadata.exposure_s = keywords.exposure_s(&mut metadata);
@@ -55,11 +54,8 @@ pub(super) struct StatedSaturation {
     level_adu: f64,
 }
 
-/// The saturation level from `headers`; earlier headers have priority.
-pub(super) fn saturation<'a>(
-    headers: impl Iterator<Item = &'a Header<'a>>,
-) -> Option<StatedSaturation> {
-    let keywords = Keywords::new(headers);
+/// The saturation level from `keywords`.
+pub(super) fn saturation(keywords: &Keywords) -> Option<StatedSaturation> {
     let number = |keyword| keywords.number_of(keyword);
     let stated = |keyword, level_adu| StatedSaturation { keyword, level_adu };
     let saturate = number("SATURATE").map(|level| stated("SATURATE", level));

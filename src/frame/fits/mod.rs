@@ -42,6 +42,7 @@ use super::image::Frame;
 use choice::Choice;
 use header::Header;
 use image::Image;
+use keywords::Keywords;
 use std::num::NonZeroUsize;
 use unit::Units;
 
@@ -64,15 +65,14 @@ pub(super) fn decode(
     let image = Image::new(&unit, layout, plane, account)?;
     // The primary header holds the keywords that are common to all units.
     let (primary, _) = Header::parse(bytes, 0)?;
-    let headers = [&unit.header, &primary];
-    let mut metadata = keywords::metadata(headers.into_iter());
+    let keywords = Keywords::new([&unit.header, &primary].into_iter());
+    let mut metadata = keywords::metadata(&keywords);
     metadata.ignored.extend(unit.ignored_blanks());
     metadata.choice = choice;
     metadata.assumed.extend(assumed);
     let mut frame = image.frame(&unit, bytes, account)?;
-    let all = keywords::Keywords::new(headers.into_iter());
-    overscan::take(&mut frame, &all, &mut metadata, account)?;
-    if let Some(stated) = keywords::saturation(headers.into_iter()) {
+    overscan::take(&mut frame, &keywords, &mut metadata, account)?;
+    if let Some(stated) = keywords::saturation(&keywords) {
         stated.apply(&mut frame, &mut metadata);
     }
     Ok(frame.with_metadata(metadata).upright())

@@ -167,7 +167,9 @@ impl<'a> Sky<'a> {
                 *pixel = sky_e * parts.light() * self.lens(&place);
             }
         }
-        self.scatter(image);
+        if self.stray_light > 0.0 {
+            self.scatter(image);
+        }
     }
 
     /// Scatters light to where the lens images nothing.

@@ -156,8 +156,7 @@ impl<'a> Grid<'a> {
 
     /// The apparent direction that is imaged at a place.
     pub(super) fn direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
-        let direction = self.found.camera.direction_of(pixel)?;
-        Some(self.found.icrs_to_camera.inverse().apply(&direction))
+        self.found.apparent_direction_of(pixel)
     }
 
     /// The cell at a place that is imaged in an apparent direction; `None` below the horizon.

@@ -119,8 +119,10 @@ pub fn measure(
     };
     let grid = Grid::over(frame);
     // A flat divides unlit pixels by what is no light.
-    let is_raw = !picture.is_flat;
-    let unlit = || DarkLevel::of_unlit_pixels(picture.frame, frame.detections).filter(|_| is_raw);
+    let unlit = || match picture.is_flat {
+        true => None,
+        false => DarkLevel::of_unlit_pixels(picture.frame, frame.detections),
+    };
     let dark = picture.dark.or_else(unlit).or(picture.usual_dark);
     let color = color::SkyColors::of(frame, picture, dark.as_ref(), &stars);
     let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);

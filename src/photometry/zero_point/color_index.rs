@@ -3,12 +3,13 @@
 use super::relation::{Relation, Term};
 use super::standard::{REFERENCE_BV_MAG, StandardStar};
 use crate::base::statistics::Estimate;
+use nalgebra::{Matrix3, Vector3};
 
 /// −2.5 log10 of the ratio: Z + k (B−V − 0.6) + q (B−V − 0.6)².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::photometry) struct ColorIndex {
     coefficients: [f64; 3],
-    covariance: [[f64; 3]; 3],
+    covariance: Matrix3<f64>,
 }
 
 impl ColorIndex {
@@ -21,7 +22,7 @@ impl ColorIndex {
         let per_mag = fit.estimate(1);
         (per_mag.value.abs() > LEAST_SIGMAS * per_mag.sigma).then(|| Self {
             coefficients: [0, 1, 2].map(|term| fit.estimate(term).value),
-            covariance: [0, 1, 2].map(|row| [0, 1, 2].map(|column| fit.covariance(row, column))),
+            covariance: Matrix3::from_fn(|row, column| fit.covariance(row, column)),
         })
     }
 
@@ -40,17 +41,8 @@ impl ColorIndex {
         if !(LEAST_MAG..MOST_MAG).contains(&off_mag) {
             return None;
         }
-        let row = [1.0, off_mag, off_mag * off_mag];
-        let along = self.covariance.iter().zip(row);
-        let variance: f64 = along
-            .map(|(line, by)| {
-                by * line
-                    .iter()
-                    .zip(row)
-                    .map(|(value, by)| value * by)
-                    .sum::<f64>()
-            })
-            .sum();
+        let row = Vector3::new(1.0, off_mag, off_mag * off_mag);
+        let variance = row.dot(&(self.covariance * row));
         Some(Estimate {
             value: REFERENCE_BV_MAG + off_mag,
             sigma: variance.max(0.0).sqrt() / (per_mag + 2.0 * off_mag * curve).abs(),
