@@ -34,7 +34,7 @@ pub use identified_frame::IdentifiedFrame;
 use crate::base::statistics::median;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, SkyView};
-use crate::sky::catalog::{Star, StarFlags, StarIndex};
+use crate::sky::catalog::StarIndex;
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
 use zero_point::{StandardStar, ZeroPoint};
@@ -134,8 +134,10 @@ fn standard_star(
     };
     let known = sky.catalog().star(star.star);
     let is_alone = star.neighbors_light.abs() < MAX_NEIGHBORS_LIGHT;
-    let is_fit =
-        is_bright && is_alone && detection.flags.has_clean_flux() && is_constant_and_single(known);
+    let is_fit = is_bright
+        && is_alone
+        && detection.flags.has_clean_flux()
+        && known.flags.is_constant_and_single();
     let off_centre_sq = frame
         .identification
         .camera
@@ -202,14 +204,4 @@ fn depth_v_mag(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> f64 {
         .fold(f64::MIN, f64::max);
     let by_flux = median(&mut offsets) + faintest_star;
     faintest.fold(by_flux, f64::max) + MARGIN_MAG
-}
-
-fn is_constant_and_single(star: &Star) -> bool {
-    let unfit = [
-        StarFlags::VARIABLE,
-        StarFlags::MULTIPLE,
-        StarFlags::BLENDED_MAGNITUDE,
-        StarFlags::BLENDED_POSITION,
-    ];
-    !unfit.into_iter().any(|flag| star.flags.contains(flag))
 }

@@ -233,6 +233,8 @@ fn the_built_in_catalog_has_the_counts_of_sky2000() {
     assert_eq!(with(StarFlags::MULTIPLE), 29_355);
     assert_eq!(with(StarFlags::VARIABLE), 12_988);
     assert_eq!(with(StarFlags::NO_PROPER_MOTION), 5);
+    assert_eq!(with(StarFlags::SMALL_AMPLITUDE), 2181);
+    assert_eq!(with(StarFlags::FAINT_COMPANION), 5239);
     assert!(stars.is_sorted_by_key(|star| ((star.v_mag * 1000.0).round() as i32, star.id)));
 }
 

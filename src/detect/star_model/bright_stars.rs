@@ -150,7 +150,8 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
     peaks: &[P],
     buffers: &mut FitBuffers,
 ) -> BrightStars {
-    let of_light = bright.filter(|peak| !peak.contrast(maps).is_sharper_than_any_spot());
+    let of_light = bright
+        .filter(|peak| !peak.is_saturated() && !peak.contrast(maps).is_sharper_than_any_spot());
     let mut alone = isolated_peaks(maps, of_light.take(MAX_PEAKS), peaks);
     let mut stars = BrightStars::new();
     loop {
@@ -170,8 +171,8 @@ fn fit_peaks<'a, P: BrightPeak + 'a>(
 /// Where fits start, each with the size of the spot in pixels.
 type Starts = ArrayVec<(SpotEstimate, f64), MAX_STARS>;
 
-/// Those of `bright` that are not saturated, and that no other of all `peaks` disturbs, with their
-/// sizes by the peaks' curvature in pixels.
+/// Those of `bright` that no other of all `peaks` disturbs, with their sizes by the peaks' curvature in
+/// pixels.
 pub(crate) fn isolated_peaks<'a, P: BrightPeak + 'a>(
     maps: &FrameMaps<'_>,
     bright: impl Iterator<Item = &'a P>,
@@ -179,7 +180,6 @@ pub(crate) fn isolated_peaks<'a, P: BrightPeak + 'a>(
 ) -> impl Iterator<Item = (&'a P, f64)> {
     let neighbors = &peaks[..peaks.len().min(MAX_NEIGHBORS)];
     bright
-        .filter(|peak| !peak.is_saturated())
         .map(|peak| (peak, peak.size_px(maps)))
         .filter(|(peak, size_px)| {
             let isolation_px = peak.isolation_px(maps, *size_px) as f32;
@@ -292,6 +292,8 @@ fn is_alone(fit: &Fit, buffers: &mut FitBuffers) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::{DetectConfig, Workspace, detect};
+    use crate::frame::Frame;
 
     fn peak((x, y): (usize, usize)) -> Peak {
         Peak {
@@ -304,6 +306,41 @@ mod tests {
             region: 0,
             saturated: false,
         }
+    }
+
+    #[test]
+    fn many_saturated_stars_hide_the_size_of_no_others() {
+        const SIDE: usize = 600;
+        const SPOT_PX: f64 = 0.7;
+        const FULL_ADU: f64 = 1000.0;
+        let mut pixels: Vec<f64> = (0..SIDE * SIDE)
+            .map(|i| 100.0 + (i * 7919 % 101) as f64 * 0.1)
+            .collect();
+        for star in 0..324 {
+            let [x, y] = [star % 18, star / 18].map(|at| 40.3 + 30.0 * at as f64 + 0.3);
+            let peak_adu = if star % 2 == 0 { 5000.0 } else { 500.0 };
+            for row in y as usize - 5..y as usize + 6 {
+                for column in x as usize - 5..x as usize + 6 {
+                    let r2 = (column as f64 - x).powi(2) + (row as f64 - y).powi(2);
+                    let pixel = &mut pixels[row * SIDE + column];
+                    *pixel += peak_adu * libm::exp(-0.5 * r2 / (SPOT_PX * SPOT_PX));
+                }
+            }
+        }
+        let pixels = pixels.into_iter().map(|adu| adu.min(FULL_ADU) as f32);
+        let frame = Frame::new(SIDE, SIDE, pixels.collect()).unwrap();
+        let config = DetectConfig {
+            saturation_adu: Some(FULL_ADU),
+            ..DetectConfig::default()
+        };
+        let found = detect(&frame, &config, &mut Workspace::new()).unwrap();
+        // Pixels are sampled here, not integrated.
+        let drawn_px = (SPOT_PX * SPOT_PX - PIXEL_VARIANCE_PX2).sqrt();
+        assert!(
+            (found.spot_sigma_px / drawn_px - 1.0).abs() < 0.05,
+            "{}",
+            found.spot_sigma_px
+        );
     }
 
     #[test]

@@ -18,9 +18,10 @@ use std::f64::consts::PI;
 const METER_DEG: f64 = 20.0;
 /// How far from the zenith it sees, in degrees.
 const METER_REACH_DEG: f64 = 30.0;
-/// Sides of the cells in which the background is measured, in pixels: as broad as the sky's where these are
-/// not broader.
+/// Least and largest side of the cells in which the background is measured, in pixels. In larger ones clouds
+/// would be lost; smaller ones, also than this many spots, the light of stars would fill.
 const MESH_PX: [f64; 2] = [16.0, 64.0];
+const MESH_PER_SPOT: f64 = 16.0;
 
 /// Why no brightness was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,7 +145,8 @@ impl Levels {
         let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
         let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
         let [least_px, most_px] = MESH_PX;
-        let mesh_px = grid.breadth_px().clamp(least_px, most_px) as usize;
+        let mesh_px =
+            (MESH_PER_SPOT * frame.detections.spot_sigma_px).clamp(least_px, most_px) as usize;
         let background = BackgroundMap::measure(picture.frame, mesh_px);
         let dark_adu = dark.map_or(0.0, |dark| dark.adu.value);
         let mut levels = Self {

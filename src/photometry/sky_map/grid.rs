@@ -144,11 +144,6 @@ impl<'a> Grid<'a> {
         grid
     }
 
-    /// The breadth of a cell near the frame's centre, in pixels.
-    pub(super) fn breadth_px(&self) -> f64 {
-        self.breadth_rad * self.camera().focal_length_px()
-    }
-
     /// The camera.
     pub(super) fn camera(&self) -> &CameraModel {
         &self.found.camera

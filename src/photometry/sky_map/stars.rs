@@ -3,7 +3,7 @@
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::identify::{IndexedCatalog, PredictedStar};
 use crate::photometry::association::Association;
-use crate::photometry::{IdentifiedFrame, Measured, is_constant_and_single};
+use crate::photometry::{IdentifiedFrame, Measured};
 
 /// A star that the frame should show, alone at its place.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ pub(super) fn of(
             let off_centre_sq = camera.off_centre_sq(&predicted.pixel);
             let detection = star.detection.map(|index| &frame.detections.sources[index]);
             let clean = detection.filter(|detection| {
-                detection.flags.has_clean_flux() && is_constant_and_single(known)
+                detection.flags.has_clean_flux() && known.flags.is_constant_and_single()
             });
             let measured = clean
                 .filter(|detection| detection.flux_adu > 0.0)

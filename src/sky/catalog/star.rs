@@ -58,7 +58,11 @@ impl StarFlags {
     /// The proper motion is unknown, and zero here.
     pub const NO_PROPER_MOTION: Self = Self(1 << 5);
 
-    const ALL_BITS: u8 = (1 << 6) - 1;
+    /// The brightness of a variable star varies by at most 0.1 mag (SKY2000 `varAmp`, or `magMin` less
+    /// `magMax`).
+    pub const SMALL_AMPLITUDE: Self = Self(1 << 6);
+    /// The companion of a double star is fainter by at least 4 mag (SKY2000 `Dmag`).
+    pub const FAINT_COMPANION: Self = Self(1 << 7);
 
     /// Whether every flag of `other` is in this set.
     pub const fn contains(self, other: Self) -> bool {
@@ -80,13 +84,18 @@ impl StarFlags {
         self.0
     }
 
-    /// Decodes the byte of the compact form; `None` if it has unknown flags.
-    pub(super) const fn from_bits(bits: u8) -> Option<Self> {
-        if bits & !Self::ALL_BITS == 0 {
-            Some(Self(bits))
-        } else {
-            None
-        }
+    /// Decodes the byte of the compact form.
+    pub(super) const fn from_bits(bits: u8) -> Self {
+        Self(bits)
+    }
+
+    /// Whether its light is that of one star, and constant within a few hundredths of a magnitude.
+    pub(crate) const fn is_constant_and_single(self) -> bool {
+        let varies = self.contains(Self::VARIABLE) && !self.contains(Self::SMALL_AMPLITUDE);
+        let is_double = self.contains(Self::MULTIPLE) && !self.contains(Self::FAINT_COMPANION);
+        let is_blend =
+            self.contains(Self::BLENDED_POSITION) || self.contains(Self::BLENDED_MAGNITUDE);
+        !(varies || is_double || is_blend)
     }
 }
 
@@ -221,7 +230,6 @@ mod tests {
         let both = StarFlags::MULTIPLE.union(StarFlags::VARIABLE);
         assert!(both.contains(StarFlags::MULTIPLE) && both.contains(StarFlags::NONE));
         assert!(!both.contains(StarFlags::BLENDED_POSITION));
-        assert_eq!(StarFlags::from_bits(both.bits()), Some(both));
-        assert_eq!(StarFlags::from_bits(0x80), None);
+        assert_eq!(StarFlags::from_bits(both.bits()), both);
     }
 }

@@ -132,7 +132,7 @@ fn decode_stars(input: &mut ByteReader, header: &Header) -> Result<Vec<Star>, Co
     let pm_decs = input.column::<2>(count);
     let (v_at, vs) = (input.at, input.column::<2>(count));
     let colors = input.column::<2>(count);
-    let (flags_at, flags) = (input.at, input.column::<1>(count));
+    let flags = input.column::<1>(count);
 
     let order = |i: usize| (i16::from_le_bytes(vs[i]), ids[i]);
     let star = |i: usize| {
@@ -146,10 +146,6 @@ fn decode_stars(input: &mut ByteReader, header: &Header) -> Result<Vec<Star>, Co
             let found = format!("star {i} at ({ra_steps}, {dec_steps})");
             return invalid(ra_at + 4 * i, found, "a position on the sphere, in 0.5 mas");
         };
-        let Some(flags) = StarFlags::from_bits(flags[i][0]) else {
-            let found = format!("flags {:#04x}", flags[i][0]);
-            return invalid(flags_at + i, found, "known flags");
-        };
         let bv_mmag = i16::from_le_bytes(colors[i]);
         Ok(Star {
             id,
@@ -158,7 +154,7 @@ fn decode_stars(input: &mut ByteReader, header: &Header) -> Result<Vec<Star>, Co
             pm_dec_mas_per_yr: f32::from(i16::from_le_bytes(pm_decs[i])),
             v_mag: mag_from_mmag(v_mmag),
             bv_mag: (bv_mmag != UNKNOWN_COLOR_MMAG).then(|| mag_from_mmag(bv_mmag)),
-            flags,
+            flags: StarFlags::from_bits(flags[i][0]),
         })
     };
     let stars: Result<Vec<Star>, CompactError> = (0..count).into_par_iter().map(star).collect();

@@ -11,7 +11,7 @@ use std::io;
 use std::path::Path;
 
 /// The columns of the bright CSV, in the order of the source.
-const BRIGHT_COLUMNS: [FixedColumn; 26] = [
+const BRIGHT_COLUMNS: [FixedColumn; 29] = [
     StarColumn::Id.fixed(),
     FixedColumn::new("HD", 36, 41),
     FixedColumn::new("SAO", 44, 49),
@@ -36,7 +36,10 @@ const BRIGHT_COLUMNS: [FixedColumn; 26] = [
     StarColumn::BMinusV.fixed(),
     FixedColumn::new("SpMK", 305, 334),
     StarColumn::Separation.fixed(),
-    FixedColumn::new("Dmag", 349, 353),
+    StarColumn::MagDifference.fixed(),
+    StarColumn::MaximumMag.fixed(),
+    StarColumn::MinimumMag.fixed(),
+    StarColumn::Amplitude.fixed(),
     StarColumn::VariableType.fixed(),
 ];
 

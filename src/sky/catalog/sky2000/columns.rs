@@ -47,11 +47,15 @@ pub(in crate::sky::catalog) enum StarColumn {
     BlendedV,
     BMinusV,
     Separation,
+    MagDifference,
+    MaximumMag,
+    MinimumMag,
+    Amplitude,
     VariableType,
 }
 
 /// The number of columns that a star is made of.
-pub(in crate::sky::catalog) const COLUMN_COUNT: usize = 19;
+pub(in crate::sky::catalog) const COLUMN_COUNT: usize = 23;
 
 /// Each [`StarColumn`] in a fixed-width record.
 pub(in crate::sky::catalog) const FIXED_COLUMNS: [FixedColumn; COLUMN_COUNT] = [
@@ -73,6 +77,10 @@ pub(in crate::sky::catalog) const FIXED_COLUMNS: [FixedColumn; COLUMN_COUNT] = [
     FixedColumn::new("f_Vmag", 249, 249),
     FixedColumn::new("B-V", 259, 264),
     FixedColumn::new("sep", 342, 348),
+    FixedColumn::new("Dmag", 349, 353),
+    FixedColumn::new("magMax", 412, 416),
+    FixedColumn::new("magMin", 417, 421),
+    FixedColumn::new("varAmp", 422, 426),
     FixedColumn::new("varTyp", 444, 446),
 ];
 

@@ -34,6 +34,8 @@ impl Sky2000Record<'_> {
         // Without a position the proper motion is only validated.
         let dec_rad = position.map_or(0.0, Position::dec_rad);
         let motion = self.proper_motion(dec_rad)?;
+        let small_amplitude = self.has_small_amplitude()?;
+        let faint_companion = self.has_faint_companion()?;
 
         let position = position.ok_or(Rejection::NoPosition)?;
         let (v_mmag, derived) = magnitude.ok_or(Rejection::NoMagnitude)?;
@@ -48,7 +50,9 @@ impl Sky2000Record<'_> {
             flags: self
                 .flags()
                 .union(StarFlags::DERIVED_MAGNITUDE.only_if(derived))
-                .union(StarFlags::NO_PROPER_MOTION.only_if(motion.is_none())),
+                .union(StarFlags::NO_PROPER_MOTION.only_if(motion.is_none()))
+                .union(StarFlags::SMALL_AMPLITUDE.only_if(small_amplitude))
+                .union(StarFlags::FAINT_COMPANION.only_if(faint_companion)),
         })
     }
 
@@ -64,6 +68,22 @@ impl Sky2000Record<'_> {
         .fold(StarFlags::NONE, |flags, (column, flag)| {
             flags.union(flag.only_if(!self.cell(column).is_empty()))
         })
+    }
+
+    fn has_small_amplitude(&self) -> Parsed<bool> {
+        const LARGEST_MMAG: u16 = 100;
+        let brightest = self.magnitude(StarColumn::MaximumMag)?;
+        let range = self.magnitude(StarColumn::MinimumMag)?.zip(brightest);
+        let by_range = range.map(|(faintest, brightest)| faintest.abs_diff(brightest));
+        let amplitude = self.magnitude(StarColumn::Amplitude)?;
+        let amplitude_mmag = amplitude.map(i16::unsigned_abs).or(by_range);
+        Ok(amplitude_mmag.is_some_and(|mmag| mmag <= LARGEST_MMAG))
+    }
+
+    fn has_faint_companion(&self) -> Parsed<bool> {
+        const LEAST_MMAG: i16 = 4000;
+        let fainter = self.magnitude(StarColumn::MagDifference)?;
+        Ok(fainter.is_some_and(|mmag| mmag >= LEAST_MMAG))
     }
 
     /// The bytes of a cell without padding.
@@ -275,6 +295,10 @@ mod tests {
         b" ",
         b"+0.620",
         b" 18.4  ",
+        b" 7.0 ",
+        b" 1.86",
+        b" 2.13",
+        b"     ",
         b"  1",
     ];
 
@@ -330,6 +354,26 @@ mod tests {
         let star = polaris_with(StarColumn::VObserved, b" 1.97 ").unwrap();
         assert_eq!(star.v_mag, 1.97);
         assert!(!star.flags.contains(StarFlags::DERIVED_MAGNITUDE));
+    }
+
+    #[test]
+    fn amplitudes_and_companions_tell_which_stars_are_fit_for_photometry() {
+        let fit = |cells: &[(StarColumn, &'static [u8])]| {
+            let mut all = POLARIS;
+            for (column, text) in cells {
+                all[*column as usize] = text;
+            }
+            parse_star(&all).unwrap().flags.is_constant_and_single()
+        };
+        // It varies by 0.27 mag.
+        assert!(!fit(&[]));
+        assert!(fit(&[(StarColumn::MinimumMag, b" 1.96")]));
+        assert!(!fit(&[(StarColumn::MinimumMag, b"     ")]));
+        let constant: (_, &[u8]) = (StarColumn::Amplitude, b" 0.03");
+        assert!(fit(&[constant]));
+        assert!(!fit(&[constant, (StarColumn::MagDifference, b" 3.9 ")]));
+        assert!(!fit(&[constant, (StarColumn::MagDifference, b"     ")]));
+        assert!(!fit(&[constant, (StarColumn::BlendedV, b"b")]));
     }
 
     #[test]
