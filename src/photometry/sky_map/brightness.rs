@@ -6,7 +6,7 @@ use super::color::{ColorIndex, SkyColors};
 use super::dark_level::DarkLevel;
 use super::grid::Grid;
 use super::picture::Picture;
-use crate::base::coords::PixelPoint;
+use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::statistics::Estimate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::BackgroundMap;
@@ -18,6 +18,10 @@ use std::f64::consts::PI;
 const METER_DEG: f64 = 20.0;
 /// How far from the zenith it sees, in degrees.
 const METER_REACH_DEG: f64 = 30.0;
+/// The light of the zenith is that of the sky farther than this from the Moon, in degrees: a meter would
+/// measure the Moon, and a camera is saturated around it.
+#[doc(hidden)]
+pub const MOON_REACH_DEG: f64 = 10.0;
 /// Least and largest side of the cells in which the background is measured, in pixels. In larger ones clouds
 /// would be lost; smaller ones, also than this many spots, the light of stars would fill.
 const MESH_PX: [f64; 2] = [16.0, 64.0];
@@ -158,6 +162,11 @@ impl Levels {
             zenith_sr: 0.0,
         };
         let mut sums = vec![CellSums::default(); grid.places.len()];
+        let is_by_moon = |direction: &UnitVector<Icrs>| {
+            let by =
+                |moon: UnitVector<Icrs>| moon.angle_to(direction) * DEG_PER_RAD < MOON_REACH_DEG;
+            picture.moon.is_some_and(by)
+        };
         let mut background_row = vec![0.0; width];
         for y in (step / 2..height).step_by(step) {
             background.row(y, &mut background_row);
@@ -193,7 +202,7 @@ impl Levels {
                 let sum = &mut sums[cell];
                 sum.airmass += airmass.unwrap_or(f64::NAN);
                 sum.limit_adu += frame.flux_limit_adu(&pixel).unwrap_or(f64::NAN);
-                if let Some(zenith) = frame.places.zenith() {
+                if let Some(zenith) = frame.places.zenith().filter(|_| !is_by_moon(&direction)) {
                     let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
                     levels.zenith.add(weight, &sample);
                     levels.zenith_sr += weight * pixel_sr * (step * step) as f64;

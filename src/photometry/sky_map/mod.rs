@@ -33,6 +33,8 @@ mod relative_limit;
 mod stars;
 mod witnesses;
 
+#[doc(hidden)]
+pub use brightness::MOON_REACH_DEG;
 pub use brightness::{NoBrightness, SkyLight, ZenithSky};
 pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;

@@ -1,6 +1,6 @@
 //! What a frame is taken of, and how the camera is set: drawn at random.
 
-use crate::base::coords::Rotation;
+use crate::base::coords::{Camera, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::model::sensitivity::{Budget, Extinction, SkyBrightness};
@@ -210,19 +210,24 @@ impl Conditions {
         scene.cloud_share = Some(self.clouds.share);
         scene.cloud_size_px = self.clouds.size_px;
         scene.cloud_light = self.clouds.light;
-        if self.moon.altitude_deg > 0.0 {
-            self.add_moon(scene, site);
+        if let Some(direction) = self.moon_direction(site) {
+            self.add_moon(scene, &direction);
         }
         setup
     }
 
-    fn add_moon(&self, scene: &mut Scene, site: Site) {
+    /// Where the Moon is, if it is above the horizon.
+    pub(super) fn moon_direction(&self, site: Site) -> Option<UnitVector<Camera>> {
         let (body, _) = moon_and_sun(&self.date(), Some(site));
         let Pointing {
             icrs_to_camera,
             places,
         } = self.pointing(site);
         let direction = icrs_to_camera.apply(&places.apparent(&body.direction));
+        (self.moon.altitude_deg > 0.0).then_some(direction)
+    }
+
+    fn add_moon(&self, scene: &mut Scene, direction: &UnitVector<Camera>) {
         let [right, down, ahead] = *direction.as_vector().as_ref();
         scene.moon_distance_deg = Some(libm::acos(ahead.clamp(-1.0, 1.0)) * DEG_PER_RAD);
         scene.moon_direction_deg = libm::atan2(right, -down) * DEG_PER_RAD;

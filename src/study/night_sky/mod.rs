@@ -67,7 +67,7 @@ impl SkyStudy<'_> {
         let (frame, _) = simulator.frame(&pointing, conditions.seed)?;
         let context = self.context(&conditions, &setup);
         let solution = solve_frame(&frame, &context, workspace)?;
-        let truth = Truth::new(&simulator, &pointing, &conditions);
+        let truth = Truth::new(&simulator, &pointing, &conditions, self.site);
         Ok(SkyTrial::new(number, &conditions, &solution, &truth))
     }
 

@@ -1,11 +1,12 @@
 //! The sky that was drawn, as its cells and a meter see it.
 
 use super::conditions::Conditions;
-use crate::base::coords::PixelPoint;
-use crate::base::units::RAD_PER_DEG;
+use crate::base::coords::{Camera, PixelPoint, UnitVector};
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::identify::Identification;
 use crate::model::simulate::{Pointing, Simulator, TrueSky};
-use crate::photometry::sky_map::{CLEAR_MAG, Place};
+use crate::photometry::sky_map::{CLEAR_MAG, MOON_REACH_DEG, Place};
+use crate::sky::observer::Site;
 use crate::study::robustness::Answer;
 use std::f64::consts::TAU;
 
@@ -20,6 +21,8 @@ pub(super) struct Truth<'a> {
     sky: TrueSky<'a>,
     simulator: &'a Simulator<'a>,
     pointing: &'a Pointing,
+    /// Where the Moon is, if it is above the horizon.
+    moon: Option<UnitVector<Camera>>,
 }
 
 /// A cell of the sky that was drawn.
@@ -39,11 +42,13 @@ impl<'a> Truth<'a> {
         simulator: &'a Simulator<'a>,
         pointing: &'a Pointing,
         conditions: &Conditions,
+        site: Site,
     ) -> Self {
         Self {
             sky: simulator.true_sky(pointing, conditions.seed),
             simulator,
             pointing,
+            moon: conditions.moon_direction(site),
         }
     }
 
@@ -109,7 +114,16 @@ impl<'a> Truth<'a> {
         })
     }
 
-    /// V magnitudes per square arcsecond of the zenith, as a meter sees it.
+    fn is_by_moon(&self, pixel: &PixelPoint) -> bool {
+        let by = |moon: &UnitVector<Camera>| {
+            let direction = self.simulator.camera().direction_of(pixel);
+            direction
+                .is_some_and(|direction| moon.angle_to(&direction) * DEG_PER_RAD < MOON_REACH_DEG)
+        };
+        self.moon.as_ref().is_some_and(by)
+    }
+
+    /// V magnitudes per square arcsecond of the zenith, as a meter sees it, without what is by the Moon.
     pub(super) fn zenith_mag_arcsec2(&self) -> f64 {
         const RING_DEG: f64 = 1.0;
         const AROUND: usize = 36;
@@ -123,6 +137,7 @@ impl<'a> Truth<'a> {
             for step in 0..AROUND {
                 let azimuth_deg = step as f64 * 360.0 / AROUND as f64;
                 let pixel = self.pixel_of(90.0 - off_deg, azimuth_deg);
+                let pixel = pixel.filter(|pixel| !self.is_by_moon(pixel));
                 if let Some(light) = pixel.and_then(|pixel| self.sky.electrons_per_sr(&pixel)) {
                     electrons += weight(off_deg) * piece_sr * light;
                     solid_angle_sr += weight(off_deg) * piece_sr;

@@ -6,6 +6,10 @@ use crate::base::units::RAD_PER_DEG;
 use crate::photometry::Measured;
 use crate::photometry::sky_map::stars::SkyStar;
 
+/// How much the extinction differs from one direction to another, in magnitudes per airmass: some percent
+/// of it. Low stars would count too much.
+const AIR_SIGMA_MAG: f64 = 0.005;
+
 /// A star by which it may be measured.
 pub(super) struct Candidate {
     pub row: Unknowns,
@@ -13,6 +17,8 @@ pub(super) struct Candidate {
     pub offset_mag: f64,
     /// Standard error of that by its own flux.
     pub sigma_mag: f64,
+    /// The same by the air in its direction.
+    pub air_sigma_mag: f64,
     pub direction: UnitVector<Icrs>,
     /// The candidate next to it, as long as it is near: clouds dim both.
     pub neighbor: Option<usize>,
@@ -44,6 +50,7 @@ impl Candidate {
             )),
             offset_mag: star.v_mag - instrumental_mag,
             sigma_mag,
+            air_sigma_mag: AIR_SIGMA_MAG * star.airmass.unwrap_or(0.0),
             direction: star.direction,
             neighbor: None,
         })
@@ -56,7 +63,8 @@ impl Candidate {
 
     /// Its standard error if it were as bright as the fit says.
     pub fn expected_sigma_mag(&self, unknowns: &Unknowns) -> f64 {
-        self.sigma_mag * libm::pow(10.0, 0.4 * self.residual_mag(unknowns))
+        let by_flux_mag = self.sigma_mag * libm::pow(10.0, 0.4 * self.residual_mag(unknowns));
+        libm::hypot(by_flux_mag, self.air_sigma_mag)
     }
 
     /// Whether it counts, by the error that it would have.

@@ -196,6 +196,7 @@ mod tests {
                 row: Unknowns::from(row_of(None, 0.0, Some(0.6), off_mag)),
                 offset_mag: ZERO_POINT_MAG - cloud_mag(index) + noise_mag,
                 sigma_mag: SIGMA_MAG,
+                air_sigma_mag: 0.0,
                 direction: UnitVector::from_ra_dec(0.1 * index as f64, 0.0),
                 neighbor: index.is_multiple_of(2).then_some(index + 1),
             }

@@ -5,7 +5,7 @@ use super::relation::Unknowns;
 use crate::base::statistics::{SIGMA_PER_MAD, median, normal_density};
 
 /// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
-pub(in crate::photometry::sky_map) const MEAN_CLOUD_MAG: f64 = 1.0;
+const MEAN_CLOUD_MAG: f64 = 1.0;
 
 /// Least number of stars.
 pub(super) const MIN_STARS: usize = 20;

@@ -14,8 +14,6 @@ mod fit;
 mod mixture;
 mod relation;
 
-pub(super) use mixture::MEAN_CLOUD_MAG;
-
 use super::stars::SkyStar;
 use crate::base::statistics::Estimate;
 use crate::photometry::Measured;
@@ -94,16 +92,20 @@ impl ClearSky {
         let extinction_mag = estimate(EXTINCTION);
         // Stars that scatter more may be behind thin clouds, all of them.
         let doubt_mag = Some(errors.scatter_mag).filter(|scatter| *scatter > CLEAR_SCATTER_MAG);
+        let slope = estimate(SLOPE);
+        // A tone curve dims stars on the bright sky above the horizon, as air does.
+        let is_extinction_measured =
+            !is_tone_curve(&slope) && extinction_mag.sigma < MEASURED * USUAL_EXTINCTION.sigma;
         Self {
             zero_point_vmag: estimate(0),
             extinction_mag,
-            is_extinction_measured: extinction_mag.sigma < MEASURED * USUAL_EXTINCTION.sigma,
+            is_extinction_measured,
             color_term: estimate(COLOR),
             edge_loss_mag: Estimate {
                 value: -fit.unknowns.dot(&edge),
                 sigma: fit.variance(&edge).sqrt(),
             },
-            slope: estimate(SLOPE),
+            slope,
             scatter_mag: errors.scatter_mag,
             stars: *stars,
             has_horizon,
@@ -157,10 +159,7 @@ impl ClearSky {
 
     /// Whether gray levels have a tone curve.
     pub(super) fn has_tone_curve(&self) -> bool {
-        const LEAST_SLOPE: f64 = 0.1;
-        const SIGMAS: f64 = 3.0;
-        let Estimate { value, sigma } = self.slope;
-        value.abs() > LEAST_SLOPE.max(SIGMAS * sigma)
+        is_tone_curve(&self.slope)
     }
 
     fn dot(&self, row: [f64; UNKNOWNS]) -> f64 {
@@ -198,4 +197,11 @@ impl ClearSky {
         let loss_mag = a * off_centre_sq + b * off_centre_sq * off_centre_sq;
         libm::pow(10.0, -0.4 * loss_mag)
     }
+}
+
+/// Whether a slope is that of a tone curve.
+fn is_tone_curve(slope: &Estimate) -> bool {
+    const LEAST_SLOPE: f64 = 0.1;
+    const SIGMAS: f64 = 3.0;
+    slope.value.abs() > LEAST_SLOPE.max(SIGMAS * slope.sigma)
 }

@@ -1,0 +1,315 @@
+//! What is believed of the cells of a sky: which are clear, and how thick clouds are.
+//!
+//! ([`Told`] each) → [`Belief`]
+//!
+//! A part of the sky has the extinction of clear air alone, and the other part more. How large that part is,
+//! and how thick its clouds are on average, is told by all cells together.
+
+use super::cases::{
+    CASES, CLEAR_MAG, Cases, HALF_STEP_MAG, STEP_MAG, STEPS, half_mag, hidden_share, mean_mag,
+};
+use crate::base::statistics::Estimate;
+use crate::photometry::sky_map::cloud_light::Hidden;
+use crate::photometry::sky_map::grid::CELLS_OF_A_STAR;
+
+/// Mean extinctions of clouds, in magnitudes, of which the likeliest counts: haze, usual clouds, thick ones.
+const MEAN_CLOUDS_MAG: [f64; 3] = [0.3, 1.0, 3.0];
+/// Cells that clouds cover by half, for each that they cover.
+const HALVES: f64 = 0.3;
+/// Variation of clear air, in magnitudes.
+const CLEAR_SIGMA_MAG: f64 = 0.05;
+/// No cell is more certain of clouds, or of a clear sky, than by this factor.
+const MOST_ODDS: f64 = 1000.0;
+
+/// A cell of which stars tell.
+#[derive(Debug, Clone)]
+pub(super) struct Told {
+    /// The cell.
+    pub cell: usize,
+    /// Solid angle of its sky.
+    pub solid_angle_sr: f64,
+    /// Likelihoods of the cases, over the largest.
+    likelihoods: Cases,
+}
+
+impl Told {
+    /// A cell by the logarithms of the likelihoods of the cases.
+    pub(super) fn new(cell: usize, solid_angle_sr: f64, ln_likelihoods: &Cases) -> Self {
+        let largest = ln_likelihoods
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            cell,
+            solid_angle_sr,
+            likelihoods: ln_likelihoods.map(|ln| libm::exp(ln - largest)),
+        }
+    }
+
+    /// Adds what else tells of it, by the share of a star's light that clouds take.
+    pub(super) fn add(&mut self, likelihood: impl Fn(f64) -> f64) {
+        for (case, likelihood_of_case) in self.likelihoods.iter_mut().enumerate() {
+            *likelihood_of_case *= likelihood(hidden_share(case));
+        }
+        let largest = self.likelihoods.iter().copied().fold(0.0, f64::max);
+        if largest > 0.0 {
+            for likelihood in &mut self.likelihoods {
+                *likelihood /= largest;
+            }
+        }
+    }
+}
+
+/// What is believed of a sky.
+#[derive(Debug, Clone)]
+pub(super) struct Belief {
+    priors: Priors,
+    /// Of each cell.
+    evidence: Vec<Evidence>,
+    /// Part of the sky that is not clear.
+    pub clouded: f64,
+    /// Error of that.
+    sigma: f64,
+}
+
+impl Belief {
+    /// With the mean extinction of clouds that is likeliest.
+    pub(super) fn of(told: &[Told]) -> Self {
+        let beliefs = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(told, Priors::new(mean_mag)));
+        let [first, rest @ ..] = beliefs;
+        let likelier = |best: Self, other: Self| {
+            if other.ln_likelihood() > best.ln_likelihood() {
+                other
+            } else {
+                best
+            }
+        };
+        rest.into_iter().fold(first, likelier)
+    }
+
+    /// The part that is clouded is the one for which what the cells show is most probable.
+    fn with(told: &[Told], priors: Priors) -> Self {
+        const STEPS: usize = 200;
+        /// Cells that are clear, and that are not, which the sky has beforehand.
+        const BEFOREHAND: f64 = 0.5;
+        let evidence: Vec<Evidence> = told.iter().map(|told| priors.evidence(told)).collect();
+        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        // The same stars tell of several cells.
+        let cells = told.len() as f64 / CELLS_OF_A_STAR;
+        let mean = |of: &dyn Fn(&Evidence) -> f64| {
+            let parts = told.iter().zip(&evidence);
+            let parts = parts.map(|(told, evidence)| told.solid_angle_sr / all_sr * of(evidence));
+            parts.sum::<f64>()
+        };
+        let mut clouded = 0.5;
+        for _ in 0..STEPS {
+            let share = mean(&|of| clouded * of.cloud.all / of.mixed(clouded));
+            let share = if told.is_empty() { 0.5 } else { share };
+            clouded = (BEFOREHAND + cells * share) / (2.0 * BEFOREHAND + cells);
+        }
+        let information = mean(&|of| ((of.cloud.all - of.clear.all) / of.mixed(clouded)).powi(2));
+        Self {
+            priors,
+            evidence,
+            clouded,
+            sigma: (cells * information).sqrt().recip().min(0.5),
+        }
+    }
+
+    fn ln_likelihood(&self) -> f64 {
+        let of_cell = |evidence: &Evidence| libm::log(evidence.mixed(self.clouded));
+        self.evidence.iter().map(of_cell).sum()
+    }
+
+    /// The share of a star's light that clouds take in a cell.
+    pub(super) fn hidden(&self, told: &Told) -> Hidden {
+        self.priors.hidden(&told.likelihoods)
+    }
+
+    /// The same of a cell of which nothing is told.
+    pub(super) fn hidden_before(&self) -> Hidden {
+        self.priors.hidden(&[1.0; CASES])
+    }
+
+    /// The probability of each cell that it is clear, and its extinction.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (f64, Estimate)> {
+        let posterior = |evidence: &Evidence| evidence.posterior(self.clouded);
+        self.evidence.iter().map(posterior)
+    }
+
+    /// Share of the sky of which stars tell that is behind clouds.
+    pub(super) fn share(&self, told: &[Told]) -> Option<Estimate> {
+        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        let clouded_sr = told.iter().zip(self.cells());
+        let clouded_sr = clouded_sr.map(|(told, (clear, _))| told.solid_angle_sr * (1.0 - clear));
+        let clouded_sr: f64 = clouded_sr.sum();
+        (all_sr > 0.0).then(|| Estimate {
+            value: clouded_sr / all_sr,
+            sigma: self.sigma,
+        })
+    }
+}
+
+/// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
+#[derive(Debug, Clone)]
+struct Priors {
+    clear: Cases,
+    cloud: Cases,
+}
+
+impl Priors {
+    /// Those of clouds with this mean extinction.
+    fn new(mean_cloud_mag: f64) -> Self {
+        let of_clear = |case: usize| match case {
+            0..STEPS => libm::exp(-0.5 * (mean_mag(case) / CLEAR_SIGMA_MAG).powi(2)),
+            _ => 0.0,
+        };
+        // Most clouds are larger than a cell.
+        let of_cloud = |case: usize| match case.checked_sub(STEPS) {
+            None => STEP_MAG * libm::exp(-mean_mag(case) / mean_cloud_mag),
+            Some(step) => HALVES * HALF_STEP_MAG * libm::exp(-half_mag(step) / mean_cloud_mag),
+        };
+        let normalized = |prior: &dyn Fn(usize) -> f64| {
+            let total: f64 = (0..CASES).map(prior).sum();
+            std::array::from_fn(|case| prior(case) / total)
+        };
+        Self {
+            clear: normalized(&of_clear),
+            cloud: normalized(&of_cloud),
+        }
+    }
+
+    fn evidence(&self, told: &Told) -> Evidence {
+        let sums = |prior: &Cases| {
+            let mut sums = Sums::default();
+            for (case, (likelihood, prior)) in told.likelihoods.iter().zip(prior).enumerate() {
+                let weight = prior * likelihood;
+                sums.all += weight;
+                sums.first += weight * mean_mag(case);
+                sums.second += weight * mean_mag(case).powi(2);
+                sums.below_clear += weight * f64::from(mean_mag(case) < CLEAR_MAG);
+            }
+            sums
+        };
+        let mut evidence = Evidence {
+            clear: sums(&self.clear),
+            cloud: sums(&self.cloud),
+        };
+        evidence.clear = evidence.clear.at_least(evidence.cloud.all / MOST_ODDS);
+        evidence.cloud = evidence.cloud.at_least(evidence.clear.all / MOST_ODDS);
+        evidence
+    }
+
+    fn hidden(&self, likelihoods: &Cases) -> Hidden {
+        let mut hidden = Hidden::NONE;
+        for (case, likelihood) in likelihoods.iter().enumerate() {
+            let [clear, cloud] = [&self.clear, &self.cloud].map(|prior| prior[case] * likelihood);
+            hidden.add(hidden_share(case), clear, cloud);
+        }
+        hidden
+    }
+}
+
+/// What is told of a cell: sums over the cases, if it is part of the clear sky, and if it is not.
+#[derive(Debug, Clone, Copy)]
+struct Evidence {
+    clear: Sums,
+    cloud: Sums,
+}
+
+/// Sums of likelihoods over the cases.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    all: f64,
+    first: f64,
+    second: f64,
+    below_clear: f64,
+}
+
+impl Evidence {
+    /// The likelihood where a part `clouded` of the sky is not clear.
+    fn mixed(&self, clouded: f64) -> f64 {
+        (1.0 - clouded) * self.clear.all + clouded * self.cloud.all
+    }
+
+    /// The probability that the sky is clear, and the extinction, where a part `clouded` of the sky is not
+    /// clear.
+    fn posterior(&self, clouded: f64) -> (f64, Estimate) {
+        let mean =
+            |of: fn(&Sums) -> f64| (1.0 - clouded) * of(&self.clear) + clouded * of(&self.cloud);
+        let all = self.mixed(clouded);
+        let first = mean(|sums| sums.first) / all;
+        let second = mean(|sums| sums.second) / all;
+        let extinction_mag = Estimate {
+            value: first,
+            sigma: (second - first * first).max(0.0).sqrt(),
+        };
+        (mean(|sums| sums.below_clear) / all, extinction_mag)
+    }
+}
+
+impl Sums {
+    /// The same with a sum that is not below `least`.
+    fn at_least(self, least: f64) -> Self {
+        if self.all >= least {
+            return self;
+        }
+        let factor = least / self.all.max(f64::MIN_POSITIVE);
+        Self {
+            all: least,
+            first: self.first * factor,
+            second: self.second * factor,
+            below_clear: self.below_clear * factor,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cell in which extinctions about `cloud_mag` are as likely as `odds` to those about zero.
+    fn told(cell: usize, cloud_mag: f64, odds: f64) -> Told {
+        let logs = std::array::from_fn(|case| {
+            let about = |mag: f64| libm::exp(-0.5 * ((mean_mag(case) - mag) / 0.1).powi(2));
+            libm::log(about(0.0) + odds * about(cloud_mag) + 1e-9)
+        });
+        Told::new(cell, 0.01, &logs)
+    }
+
+    #[test]
+    fn all_cells_together_tell_how_much_is_clear() {
+        let cells = |clear: usize, cloudy: usize| -> Vec<Told> {
+            let odds = |cell: usize| if cell < clear { 1e-3 } else { 1e4 };
+            (0..clear + cloudy)
+                .map(|cell| told(cell, 1.0, odds(cell)))
+                .collect()
+        };
+        let mostly_clear = cells(90, 10);
+        let belief = Belief::of(&mostly_clear);
+        let share = belief.share(&mostly_clear).unwrap();
+        assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
+        assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
+        // The same cell is more likely clear where most of the sky is.
+        let doubtful = belief.priors.evidence(&told(0, 1.0, 10.0));
+        let (clear, _) = doubtful.posterior(belief.clouded);
+        let (less, _) = doubtful.posterior(Belief::of(&cells(10, 90)).clouded);
+        assert!(clear > less + 0.3, "{clear} {less}");
+        assert_eq!(Belief::of(&[]).share(&[]), None);
+    }
+
+    #[test]
+    fn thin_clouds_are_likelier_where_all_clouds_are_thin() {
+        let cells = |cloud_mag: f64| -> Vec<Told> {
+            let odds = |cell: usize| if cell.is_multiple_of(3) { 20.0 } else { 0.05 };
+            (0..300)
+                .map(|cell| told(cell, cloud_mag, odds(cell)))
+                .collect()
+        };
+        let thin = cells(0.4);
+        let share = Belief::of(&thin).share(&thin).unwrap();
+        assert!((share.value - 0.33).abs() < 0.1, "{share:?}");
+        let usual = Belief::with(&thin, Priors::new(1.0));
+        assert!(usual.share(&thin).unwrap().value < share.value);
+    }
+}
