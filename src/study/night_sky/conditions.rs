@@ -35,6 +35,8 @@ const CLOUD_SHARES: [f64; 2] = [0.1, 0.9];
 const CLOUD_SIZES: [f64; 3] = [1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0];
 /// Light of the thickest clouds over that of the clear sky.
 const CLOUDS_LIGHT: [f64; 3] = [0.0, 0.5, 1.5];
+/// Standard deviation of stars about their catalogue magnitudes: errors of the catalogue, and variables.
+const STAR_SIGMA_MAG: f64 = 0.03;
 /// Frames with clouds among three.
 const CLOUDY_OF_THREE: u32 = 2;
 
@@ -203,6 +205,7 @@ impl Conditions {
         conditions.sky = SkyBrightness::MagArcsec2(self.sky_mag_arcsec2);
         conditions.extinction = Extinction::MagPerAirmass(self.true_extinction_mag);
         let scene = &mut setup.scene;
+        scene.vmag_sigma = STAR_SIGMA_MAG;
         scene.by_altitude = 1.0;
         scene.milky_way = Some(1.0);
         scene.stray_light = self.stray_light;

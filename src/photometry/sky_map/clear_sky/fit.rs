@@ -1,7 +1,7 @@
 //! The relation for the stars in clear air, fitted among stars that clouds dim.
 
 use super::candidate::Candidate;
-use super::mixture::{CloudMix, Kind, MIN_STARS, StarErrors, clear_stars, errors_of};
+use super::mixture::{CloudMix, Kind, StarErrors, are_enough, clear_stars, errors_of};
 use super::relation::{UNKNOWNS, Unknowns, experience};
 use crate::base::statistics::Estimate;
 use nalgebra::SMatrix;
@@ -74,8 +74,7 @@ impl ClearFit {
             let stars: Vec<(&Candidate, Kind)> = counting
                 .map(|star| (star, star.kind(&fit.unknowns, errors, &fitted.clouds)))
                 .collect();
-            let clear = clear_stars(&stars);
-            if clear < MIN_STARS as f64 {
+            if !are_enough(&stars) {
                 return None;
             }
             let mut next = Fit::of(&stars, fit, errors, is_flat)?;
@@ -86,7 +85,7 @@ impl ClearFit {
             fitted = Self {
                 fit: next,
                 errors: next_errors,
-                stars: clear.round() as usize,
+                stars: clear_stars(&stars).round() as usize,
                 clouds: CloudMix::of(&stars),
             };
             if changed_mag.max(moved_mag) < SETTLED_MAG {

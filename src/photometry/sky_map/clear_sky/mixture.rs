@@ -7,8 +7,10 @@ use crate::base::statistics::{SIGMA_PER_MAD, median, normal_density};
 /// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
 const MEAN_CLOUD_MAG: f64 = 1.0;
 
-/// Least number of stars.
-pub(super) const MIN_STARS: usize = 20;
+/// Least number of stars in clear air, and their least share of all: fewer may be brighter by a neighbor, in a
+/// sky that is clear.
+const MIN_STARS: f64 = 12.0;
+const MIN_SHARE: f64 = 0.1;
 
 /// What the magnitudes of stars in clear air scatter, beside what is stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,6 +115,11 @@ impl Candidate {
     }
 }
 
+/// Whether enough stars are in clear air.
+pub(super) fn are_enough(stars: &[(&Candidate, Kind)]) -> bool {
+    clear_stars(stars) >= MIN_STARS.max(MIN_SHARE * stars.len() as f64)
+}
+
 /// Number of stars in clear air.
 pub(super) fn clear_stars(stars: &[(&Candidate, Kind)]) -> f64 {
     stars.iter().map(|(_, kind)| kind.clear).sum()
@@ -126,8 +133,9 @@ pub(super) fn errors_of(
     unknowns: &Unknowns,
 ) -> StarErrors {
     /// Least scatter of a star: its catalogue magnitude and its pixels.
-    const LEAST_MAG: f64 = 0.01;
+    const LEAST_MAG: f64 = 0.02;
     const MOST_MAG: f64 = 0.5;
+    const MIN_PAIRS: usize = 20;
     /// Stated errors too large by less than this are right.
     const LARGEST_SCALE: f64 = 0.8;
     let clear = stars.iter().filter(|(_, kind)| kind.clear > 0.5);
@@ -152,7 +160,7 @@ pub(super) fn errors_of(
         Some(0.5 * (apart_mag.powi(2) - stated[0].powi(2) - stated[1].powi(2)))
     });
     let mut apart: Vec<f64> = apart.collect();
-    if apart.len() >= MIN_STARS {
+    if apart.len() >= MIN_PAIRS {
         scatter_mag2 = scatter_mag2.min(median(&mut apart));
     }
     StarErrors {
