@@ -22,9 +22,10 @@ const METER_REACH_DEG: f64 = 30.0;
 /// measure the Moon, and a camera is saturated around it.
 #[doc(hidden)]
 pub const MOON_REACH_DEG: f64 = 10.0;
-/// Least and largest side of the cells in which the background is measured, in pixels. In larger ones clouds
-/// would be lost; smaller ones, also than this many spots, the light of stars would fill.
+/// Least and largest side of the cells in which the background is measured, in pixels: larger ones smooth
+/// clouds away.
 const MESH_PX: [f64; 2] = [16.0, 64.0];
+/// The side over the size of a spot: the light of stars fills smaller ones.
 const MESH_PER_SPOT: f64 = 16.0;
 
 /// Why no brightness was measured.

@@ -7,7 +7,7 @@ use crate::photometry::Measured;
 use crate::photometry::sky_map::stars::SkyStar;
 
 /// How much the extinction differs from one direction to another, in magnitudes per airmass: some percent
-/// of it. Low stars would count too much.
+/// of it. Without it, low stars would count too much.
 const AIR_SIGMA_MAG: f64 = 0.005;
 
 /// A star by which it may be measured.
