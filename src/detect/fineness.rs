@@ -12,10 +12,6 @@ const RMS_PER_BEND: f32 = 0.037_267_8;
 const LARGEST_SCATTER: f32 = 0.5;
 /// Most cells: this share of them.
 const MOST: f32 = 0.75;
-/// Least side of a cell, over the size of a spot: the light of bright stars would be in the background.
-const LEAST_PER_SPOT: f64 = 16.0;
-/// Least side of a cell, in pixels: with fewer pixels the noise of the background would matter.
-const LEAST_PX: usize = 16;
 /// Finer cells count where they lower the limit to this part of it: at edges they make it worse.
 const WORTHWHILE: f64 = 0.95;
 
@@ -77,6 +73,15 @@ impl CellSize {
     }
 }
 
+/// Least side of a cell for spots of this standard deviation, all in pixels.
+pub(crate) fn least_cell_px(spot_sigma_px: f64) -> f64 {
+    /// Over the size of a spot: the light of bright stars would be in the background.
+    const LEAST_PER_SPOT: f64 = 16.0;
+    /// With fewer pixels the noise of the background would matter.
+    const LEAST_PX: f64 = 16.0;
+    (LEAST_PER_SPOT * spot_sigma_px).max(LEAST_PX)
+}
+
 /// The side of the cells that the bends of a background with cells of `cell_px` ask for.
 fn finer_px(
     cell_px: usize,
@@ -84,7 +89,7 @@ fn finer_px(
     Searched { stars, pass }: &Searched,
     sorted: &mut Vec<f32>,
 ) -> usize {
-    let least_px = LEAST_PX.max((LEAST_PER_SPOT * stars.spot_px).ceil() as usize);
+    let least_px = least_cell_px(stars.spot_px).ceil() as usize;
     let scatter = |bend: f32| bend * RMS_PER_BEND / pass.matched_gain as f32;
     sorted.clear();
     sorted.extend(background.mesh.bends_over_noise().map(scatter));

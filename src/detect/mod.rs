@@ -82,6 +82,7 @@ use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{FrameBackground, Mesh};
 use candidates::{CandidateMemory, PeakSearch};
 use fineness::CellSize;
+pub(crate) use fineness::least_cell_px;
 use measure::{MeasureBuffers, Measurement, Ring, StarShape, sharpest_px};
 use pixels::View;
 use psf::FieldTables;

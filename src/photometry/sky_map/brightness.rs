@@ -9,7 +9,7 @@ use super::picture::Picture;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::statistics::Estimate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
-use crate::detect::BackgroundMap;
+use crate::detect::{BackgroundMap, least_cell_px};
 use crate::model::sensitivity::SkyBrightness;
 use crate::photometry::{IdentifiedFrame, MAG_PER_RELATIVE, instrumental_mag};
 use std::f64::consts::PI;
@@ -22,11 +22,8 @@ const METER_REACH_DEG: f64 = 30.0;
 /// measure the Moon, and a camera is saturated around it.
 #[doc(hidden)]
 pub const MOON_REACH_DEG: f64 = 10.0;
-/// Least and largest side of the cells in which the background is measured, in pixels: larger ones smooth
-/// clouds away.
-const MESH_PX: [f64; 2] = [16.0, 64.0];
-/// The side over the size of a spot: the light of stars fills smaller ones.
-const MESH_PER_SPOT: f64 = 16.0;
+/// Largest side of the cells in which the background is measured, in pixels: larger ones smooth clouds away.
+const MOST_MESH_PX: f64 = 64.0;
 
 /// Why no brightness was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,10 +146,8 @@ impl Levels {
         let (width, height) = (picture.frame.width, picture.frame.height);
         let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
         let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
-        let [least_px, most_px] = MESH_PX;
-        let mesh_px =
-            (MESH_PER_SPOT * frame.detections.spot_sigma_px).clamp(least_px, most_px) as usize;
-        let background = BackgroundMap::measure(picture.frame, mesh_px);
+        let mesh_px = least_cell_px(frame.detections.spot_sigma_px).min(MOST_MESH_PX);
+        let background = BackgroundMap::measure(picture.frame, mesh_px as usize);
         let dark_adu = dark.map_or(0.0, |dark| dark.adu.value);
         let mut levels = Self {
             cells: vec![CellLevel::default(); grid.places.len()],
@@ -203,8 +198,10 @@ impl Levels {
                 let sum = &mut sums[cell];
                 sum.airmass += airmass.unwrap_or(f64::NAN);
                 sum.limit_adu += frame.flux_limit_adu(&pixel).unwrap_or(f64::NAN);
-                if let Some(zenith) = frame.places.zenith().filter(|_| !is_by_moon(&direction)) {
-                    let weight = meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD);
+                let weight = frame.places.zenith().map_or(0.0, |zenith| {
+                    meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD)
+                });
+                if weight > 0.0 && !is_by_moon(&direction) {
                     levels.zenith.add(weight, &sample);
                     levels.zenith_sr += weight * pixel_sr * (step * step) as f64;
                 }

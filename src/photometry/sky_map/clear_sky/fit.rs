@@ -1,7 +1,7 @@
 //! The relation for the stars in clear air, fitted among stars that clouds dim.
 
 use super::candidate::Candidate;
-use super::mixture::{CloudMix, Kind, StarErrors, are_enough, clear_stars, errors_of};
+use super::mixture::{CloudMix, Kind, StarErrors, clear_stars, errors_of, least_clear};
 use super::relation::{UNKNOWNS, Unknowns, experience};
 use crate::base::statistics::Estimate;
 use nalgebra::SMatrix;
@@ -74,7 +74,8 @@ impl ClearFit {
             let stars: Vec<(&Candidate, Kind)> = counting
                 .map(|star| (star, star.kind(&fit.unknowns, errors, &fitted.clouds)))
                 .collect();
-            if !are_enough(&stars) {
+            let clear = clear_stars(&stars);
+            if clear < least_clear(stars.len()) {
                 return None;
             }
             let mut next = Fit::of(&stars, fit, errors, is_flat)?;
@@ -85,7 +86,7 @@ impl ClearFit {
             fitted = Self {
                 fit: next,
                 errors: next_errors,
-                stars: clear_stars(&stars).round() as usize,
+                stars: clear.round() as usize,
                 clouds: CloudMix::of(&stars),
             };
             if changed_mag.max(moved_mag) < SETTLED_MAG {

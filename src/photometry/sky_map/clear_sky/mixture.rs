@@ -115,9 +115,9 @@ impl Candidate {
     }
 }
 
-/// Whether enough stars are in clear air.
-pub(super) fn are_enough(stars: &[(&Candidate, Kind)]) -> bool {
-    clear_stars(stars) >= MIN_STARS.max(MIN_SHARE * stars.len() as f64)
+/// How many of so many stars are in clear air at least.
+pub(super) fn least_clear(stars: usize) -> f64 {
+    MIN_STARS.max(MIN_SHARE * stars as f64)
 }
 
 /// Number of stars in clear air.

@@ -5,9 +5,7 @@
 //! A part of the sky has the extinction of clear air alone, and the other part more. How large that part is,
 //! and how thick its clouds are on average, is told by all cells together.
 
-use super::cases::{
-    CASES, CLEAR_MAG, Cases, HALF_STEP_MAG, STEP_MAG, STEPS, half_mag, hidden_share, mean_mag,
-};
+use super::cases::{CASES, CLEAR_MAG, Cases, HALF_STEP_MAG, STEP_MAG, STEPS, half_mag, mean_mag};
 use crate::base::statistics::Estimate;
 use crate::photometry::sky_map::cloud_light::Hidden;
 use crate::photometry::sky_map::grid::CELLS_OF_A_STAR;
@@ -46,10 +44,11 @@ impl Told {
         }
     }
 
-    /// Adds what else tells of it, by the share of a star's light that clouds take.
-    pub(super) fn add(&mut self, likelihood: impl Fn(f64) -> f64) {
-        for (case, likelihood_of_case) in self.likelihoods.iter_mut().enumerate() {
-            *likelihood_of_case *= likelihood(hidden_share(case));
+    /// Adds what else tells of it, by the share of a star's light that clouds take; `hidden_shares` are those of
+    /// the cases.
+    pub(super) fn add(&mut self, hidden_shares: &Cases, likelihood: impl Fn(f64) -> f64) {
+        for (likelihood_of_case, share) in self.likelihoods.iter_mut().zip(hidden_shares) {
+            *likelihood_of_case *= likelihood(*share);
         }
         let largest = self.likelihoods.iter().copied().fold(0.0, f64::max);
         if largest > 0.0 {
@@ -121,14 +120,14 @@ impl Belief {
         self.evidence.iter().map(of_cell).sum()
     }
 
-    /// The share of a star's light that clouds take in a cell.
-    pub(super) fn hidden(&self, told: &Told) -> Hidden {
-        self.priors.hidden(&told.likelihoods)
+    /// The share of a star's light that clouds take in a cell; `hidden_shares` are those of the cases.
+    pub(super) fn hidden(&self, told: &Told, hidden_shares: &Cases) -> Hidden {
+        self.priors.hidden(&told.likelihoods, hidden_shares)
     }
 
     /// The same of a cell of which nothing is told.
-    pub(super) fn hidden_before(&self) -> Hidden {
-        self.priors.hidden(&[1.0; CASES])
+    pub(super) fn hidden_before(&self, hidden_shares: &Cases) -> Hidden {
+        self.priors.hidden(&[1.0; CASES], hidden_shares)
     }
 
     /// The probability of each cell that it is clear, and its extinction.
@@ -200,11 +199,11 @@ impl Priors {
         evidence
     }
 
-    fn hidden(&self, likelihoods: &Cases) -> Hidden {
+    fn hidden(&self, likelihoods: &Cases, hidden_shares: &Cases) -> Hidden {
         let mut hidden = Hidden::NONE;
         for (case, likelihood) in likelihoods.iter().enumerate() {
             let [clear, cloud] = [&self.clear, &self.cloud].map(|prior| prior[case] * likelihood);
-            hidden.add(hidden_share(case), clear, cloud);
+            hidden.add(hidden_shares[case], clear, cloud);
         }
         hidden
     }

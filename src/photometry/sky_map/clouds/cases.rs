@@ -28,11 +28,11 @@ pub(super) fn mean_mag(case: usize) -> f64 {
     }
 }
 
-/// Mean share of a star's light that clouds take in a case.
-pub(super) fn hidden_share(case: usize) -> f64 {
+/// Mean share of a star's light that clouds take in each case.
+pub(super) fn hidden_shares() -> Cases {
     let of = |mag: f64| 1.0 - libm::pow(10.0, -0.4 * mag);
-    match case.checked_sub(STEPS) {
+    std::array::from_fn(|case| match case.checked_sub(STEPS) {
         None => of(case as f64 * STEP_MAG),
         Some(step) => 0.5 * of(half_mag(step)),
-    }
+    })
 }

@@ -10,13 +10,13 @@ mod belief;
 mod cases;
 
 use super::brightness::Levels;
-use super::cloud_light::{CloudLight, LitCell, terms};
+use super::cloud_light::{CloudLight, Hidden, LitCell, terms};
 use super::relative_limit::RelativeLimit;
 use super::witnesses::{Sky, Witness};
 use crate::base::statistics::Estimate;
 use belief::{Belief, Told};
 pub use cases::CLEAR_MAG;
-use cases::{CASES, Cases, STEP_MAG, STEPS, half_mag};
+use cases::{CASES, Cases, STEP_MAG, STEPS, half_mag, hidden_shares};
 
 /// Variation of the extinction within a cell, over the extinction.
 const CLOUD_VARIATION: f64 = 0.3;
@@ -70,14 +70,15 @@ impl Sky<'_> {
             told.extend(logs.map(|logs| Told::new(cell, solid_angle_sr, &logs)));
         }
         let mut belief = Belief::of(&told);
+        let shares = hidden_shares();
         let lit = told
             .iter()
-            .filter_map(|told| self.lit(told, levels, &belief));
-        let before = belief.hidden_before();
+            .filter_map(|told| self.lit(told, levels, belief.hidden(told, &shares)));
+        let before = belief.hidden_before(&shares);
         if let Some(light) = CloudLight::of(lit.collect(), &before, belief.clouded) {
             for told in &mut told {
                 let cell = told.cell;
-                told.add(|share| light.likelihood(cell, share));
+                told.add(&shares, |share| light.likelihood(cell, share));
             }
             belief = Belief::of(&told);
         }
@@ -123,13 +124,13 @@ impl Sky<'_> {
     }
 
     /// A cell with its light.
-    fn lit(&self, told: &Told, levels: &Levels, belief: &Belief) -> Option<LitCell> {
+    fn lit(&self, told: &Told, levels: &Levels, hidden: Hidden) -> Option<LitCell> {
         let place = self.grid.pixel_of(told.cell)?;
         let direction = self.grid.direction_of(&place)?;
         let (camera, zenith) = (self.grid.camera(), self.frame.places.zenith());
         Some(LitCell {
             cell: told.cell,
-            hidden: belief.hidden(told),
+            hidden,
             light: levels.radiance_adu_sr(told.cell)?,
             terms: terms(camera, &place, &direction, zenith, self.moon.as_ref()),
         })
