@@ -1,4 +1,4 @@
-//! What reading a frame may take: memory, on one account, and time.
+//! What reading a frame may take, memory on one account and time, and what of its colors is wanted.
 
 use super::error::FrameError;
 use super::memory::MemoryLimit;
@@ -20,6 +20,8 @@ pub(super) struct Account {
     limit: MemoryLimit,
     held_bytes: Cell<u64>,
     interrupt: Interrupt,
+    channel: Option<usize>,
+    has_colors: Cell<bool>,
 }
 
 impl Account {
@@ -27,9 +29,29 @@ impl Account {
     pub fn new(limit: MemoryLimit, interrupt: Interrupt) -> Self {
         Self {
             limit,
-            held_bytes: Cell::new(0),
             interrupt,
+            ..Self::default()
         }
+    }
+
+    /// The same for one channel of a color image, in place of its luminance: 0 is red.
+    pub fn of_channel(self, channel: usize) -> Self {
+        Self {
+            channel: Some(channel),
+            ..self
+        }
+    }
+
+    /// The channel of a color image that is wanted in place of its luminance. Decoders ask where the image has
+    /// colors.
+    pub fn color_channel(&self) -> Option<usize> {
+        self.has_colors.set(true);
+        self.channel
+    }
+
+    /// Whether the image has colors: known once it is decoded.
+    pub fn has_colors(&self) -> bool {
+        self.has_colors.get()
     }
 
     /// Books what is held from now on.

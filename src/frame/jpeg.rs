@@ -50,7 +50,7 @@ pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Frame<'static>, 
         values: &values,
         channels: jpeg.channels,
     };
-    let frame = frame_from_integers(&samples, u8::MAX)?;
+    let frame = frame_from_integers(&samples, u8::MAX, account)?;
     drop(values);
     let metadata = jpeg.exif.map(|exif| exif::metadata(&exif, width));
     Ok(frame.with_metadata(metadata.unwrap_or_default()).drawn())

@@ -1,5 +1,6 @@
 //! From decoded samples to a frame: luminance, saturation and the step between grey levels.
 
+use super::account::Account;
 use super::error::FrameError;
 use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
@@ -68,7 +69,7 @@ impl<'p> Frame<'p> {
             values,
             channels: 1,
         };
-        frame_from_integers(&samples, full_scale)
+        frame_from_integers(&samples, full_scale, &Account::default())
     }
 
     /// The luminance of a picture of 3 colors, whose samples are whole numbers, as of a file: pixel
@@ -88,7 +89,7 @@ impl<'p> Frame<'p> {
             values,
             channels,
         };
-        frame_from_integers(&samples, full_scale)
+        frame_from_integers(&samples, full_scale, &Account::default())
     }
 
     /// The same of samples that are floats, which have no step and no full scale.
@@ -100,7 +101,7 @@ impl<'p> Frame<'p> {
         channels: usize,
         values: Vec<f32>,
     ) -> Result<Self, FrameError> {
-        frame_from_floats(size, channels, values)
+        frame_from_floats(size, channels, values, &Account::default())
     }
 }
 
@@ -108,6 +109,7 @@ impl<'p> Frame<'p> {
 pub(super) fn frame_from_integers<T: WholeNumber>(
     samples: &LevelSamples<'_, T>,
     full_scale: T,
+    account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
     let (width, height) = (samples.width, samples.height);
     check_size(width, height)?;
@@ -127,7 +129,10 @@ pub(super) fn frame_from_integers<T: WholeNumber>(
         channels => {
             let colors = values.chunks_exact(channels);
             let luminance = |c: &[T]| luminance([level(c[0]), level(c[1]), level(c[2])], full);
-            Pixels::F32(colors.map(luminance).collect())
+            Pixels::F32(match account.color_channel() {
+                None => colors.map(luminance).collect(),
+                Some(channel) => colors.map(|c| level(c[channel])).collect(),
+            })
         }
     };
     let step = if samples.channels <= 2 {
@@ -195,14 +200,18 @@ pub(super) fn frame_from_floats(
     size: Size,
     channels: usize,
     values: Vec<f32>,
+    account: &Account,
 ) -> Result<Frame<'static>, FrameError> {
+    let samples = values.chunks_exact(channels);
     let pixels = match channels {
         1 => values,
-        2 => values.chunks_exact(2).map(|c| c[0]).collect(),
-        channels => values
-            .chunks_exact(channels)
-            .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
-            .collect(),
+        2 => samples.map(|c| c[0]).collect(),
+        _ => match account.color_channel() {
+            None => samples
+                .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
+                .collect(),
+            Some(channel) => samples.map(|c| c[channel]).collect(),
+        },
     };
     Frame::new(size.width, size.height, pixels)
 }

@@ -83,14 +83,14 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
                 let unscaled = |v: &mut u8| *v = level((*v).into(), 0xff) as u8;
                 levels.iter_mut().for_each(unscaled);
             }
-            decoded.integers(decoded.image.as_bytes(), maxval as u8)
+            decoded.integers(decoded.image.as_bytes(), maxval as u8, account)
         }
         (Depth::Sixteen, Ok(maxval)) => {
             for levels in decoded.words_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
                 account.check_time()?;
                 levels.iter_mut().for_each(|v| *v = level(*v, u16::MAX));
             }
-            decoded.integers(decoded.words(), maxval)
+            decoded.integers(decoded.words(), maxval, account)
         }
         _ => Err(unsupported(
             format,
@@ -151,8 +151,8 @@ fn decode_with(
 ) -> Result<Frame<'static>, FrameError> {
     let decoded = Decoded::new(decoder, format, found_bytes, account)?;
     let frame = match decoded.depth {
-        Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX),
-        Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX),
+        Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX, account),
+        Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX, account),
     }?;
     drop(decoded);
     let metadata = exif.map(|exif| exif::metadata(exif, frame.width));
@@ -241,6 +241,7 @@ impl Decoded {
         &self,
         values: &[T],
         full_scale: T,
+        account: &Account,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.image.width() as usize,
@@ -248,7 +249,7 @@ impl Decoded {
             values,
             channels: self.channels,
         };
-        frame_from_integers(&samples, full_scale)
+        frame_from_integers(&samples, full_scale, account)
     }
 }
 

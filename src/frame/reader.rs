@@ -29,6 +29,8 @@ pub struct Buffers {
     interrupt: Interrupt,
     /// What is held beside the frame that was read last.
     beside_bytes: u64,
+    /// The page of the file in `bytes` that was read last, if it has colors.
+    color_page: Option<Option<NonZeroUsize>>,
 }
 
 impl Buffers {
@@ -57,6 +59,28 @@ impl Buffers {
         if let Pixels::U16(Cow::Owned(pixels)) = frame.pixels {
             self.pixels = pixels;
         }
+    }
+
+    /// From now on no frame was read.
+    pub(crate) fn forget(&mut self) {
+        self.color_page = None;
+    }
+
+    /// Red and blue of the file of which `held` was read last, with rows as it had then. `None` if it has no colors,
+    /// or there is no room for them.
+    pub(crate) fn red_and_blue(&self, held: &Frame) -> Option<[Frame<'static>; 2]> {
+        const RED: usize = 0;
+        const BLUE: usize = 2;
+        let page = self.color_page?;
+        let decode = |channel: usize, held_bytes: u64| {
+            let account = Account::new(self.memory, Interrupt::default()).of_channel(channel);
+            account.hold(self.beside_bytes + held_bytes).ok()?;
+            decode_with(&self.bytes, page, &account, Vec::new()).ok()
+        };
+        let held_bytes = held.pixels.bytes();
+        let red = decode(RED, held_bytes)?;
+        let blue = decode(BLUE, held_bytes + red.pixels.bytes())?;
+        Some([red, blue])
     }
 
     /// The memory for the frame that was read last and the work on it.
@@ -137,6 +161,7 @@ fn read_expected(
     buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
     // Whatever was read before, this frame has all of the memory.
+    buffers.forget();
     let mut bytes = std::mem::take(&mut buffers.bytes);
     let mut pixels = std::mem::take(&mut buffers.pixels);
     bytes.clear();
@@ -152,6 +177,7 @@ fn read_expected(
     buffers.beside_bytes = bytes.capacity() as u64;
     let frame = decode_with(&bytes, page, &account, pixels);
     buffers.bytes = bytes;
+    buffers.color_page = account.has_colors().then_some(page);
     frame
 }
 

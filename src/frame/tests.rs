@@ -59,6 +59,26 @@ fn color_becomes_luminance_and_one_full_channel_saturates_a_pixel() {
 }
 
 #[test]
+fn red_and_blue_are_those_of_the_file_that_was_read_last() {
+    use ::tiff::encoder::colortype::{Gray8, RGB8, RGB32Float};
+    let mut buffers = Buffers::new();
+    let levels: Vec<u8> = (0..27).collect();
+    let floats: Vec<f32> = levels.iter().map(|&level| level.into()).collect();
+    for file in [
+        tiff_of::<RGB8>(3, 3, &levels),
+        tiff_of::<RGB32Float>(3, 3, &floats),
+    ] {
+        let frame = read_stream(file.as_slice(), None, &mut buffers).unwrap();
+        let [red, blue] = buffers.red_and_blue(&frame).unwrap();
+        assert_eq!((red.at(1, 0), blue.at(1, 0)), (3.0, 5.0));
+        assert_eq!((red.at(2, 2), blue.at(2, 2)), (24.0, 26.0));
+    }
+    let grey = tiff_of::<Gray8>(3, 3, &levels[..9]);
+    let frame = read_stream(grey.as_slice(), None, &mut buffers).unwrap();
+    assert_eq!(buffers.red_and_blue(&frame), None);
+}
+
+#[test]
 fn nan_pixels_of_a_float_tiff_stay_nan() {
     use ::tiff::encoder::colortype::Gray32Float;
     let mut data = vec![1.5f32; 9];

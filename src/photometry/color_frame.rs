@@ -1,8 +1,58 @@
-//! The light behind each filter of a raw color frame.
+//! The light behind each filter of a color camera.
 
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::normal_cdf;
 use crate::frame::{Frame, Mosaic};
+use std::borrow::Cow;
+
+/// The colors of a picture.
+#[derive(Debug)]
+#[doc(hidden)]
+pub enum PictureColors<'a> {
+    /// A raw frame, whose pixels lie under a mosaic.
+    Raw(ColorFrame<'a>),
+    /// Red and blue of a picture that has all colors in each pixel.
+    RedAndBlue(Box<[Frame<'static>; 2]>),
+}
+
+impl PictureColors<'_> {
+    /// The flux of a star behind two filters, in the order of [`Self::frames`]: as [`ColorFrame::fluxes_adu`].
+    pub(super) fn fluxes_adu(&self, star: &PixelPoint, grey_sigma_px: f64) -> Option<[f64; 2]> {
+        match self {
+            Self::Raw(color) => {
+                let [_, first, second] = color.fluxes_adu(star, grey_sigma_px)?;
+                Some([first, second])
+            }
+            Self::RedAndBlue(frames) => {
+                let [red, blue] = &**frames;
+                let flux = |frame| {
+                    let [flux] = fluxes_adu(frame, star, grey_sigma_px, |_, _| 0)?;
+                    Some(flux)
+                };
+                Some([flux(red)?, flux(blue)?])
+            }
+        }
+    }
+
+    /// The pixels behind the two filters; `None` if one of them has none with a value.
+    pub(super) fn frames(&self) -> Option<[Cow<'_, Frame<'static>>; 2]> {
+        match self {
+            Self::Raw(ColorFrame { mosaic, raw }) => {
+                let under = |filter| mosaic.pixels_under(filter, raw).map(Cow::Owned);
+                Some([under(1)?, under(2)?])
+            }
+            Self::RedAndBlue(frames) => Some(frames.each_ref().map(Cow::Borrowed)),
+        }
+    }
+
+    /// Pixels of the picture for one of these, on each axis.
+    pub(super) const fn pixels_of_one(&self) -> usize {
+        match self {
+            Self::Raw(_) => 2,
+            Self::RedAndBlue(_) => 1,
+        }
+    }
+}
 
 /// A raw frame of a color camera.
 #[derive(Debug, Clone, Copy)]
@@ -22,38 +72,43 @@ impl ColorFrame<'_> {
         star: &PixelPoint,
         grey_sigma_px: f64,
     ) -> Option<[f64; Mosaic::FILTERS]> {
-        /// The part of the frame that is looked at, in standard deviations from the star.
-        const REACH: f64 = 6.0;
         let sigma_px = Mosaic::raw_spot_px(grey_sigma_px);
-        let reach = (REACH * (sigma_px + 0.5)).ceil() as usize;
-        let range = |at: f64, side: usize| {
-            let first = (at.round().max(0.0) as usize).checked_sub(reach)?;
-            let end = first + 2 * reach + 1;
-            (end <= side).then_some(first..end)
-        };
-        let (columns, rows) = (
-            range(star.x, self.raw.width)?,
-            range(star.y, self.raw.height)?,
-        );
-        let share = |at: usize, center: f64| {
-            let cdf = |edge: f64| normal_cdf((at as f64 + edge - center) / sigma_px);
-            cdf(0.5) - cdf(-0.5)
-        };
-        let across: Vec<f64> = columns.clone().map(|x| share(x, star.x)).collect();
-        let mut sums = [Sums::default(); Mosaic::FILTERS];
-        for y in rows {
-            let down = share(y, star.y);
-            for (x, across) in columns.clone().zip(&across) {
-                let pixel = f64::from(self.raw.at(x, y));
-                sums[self.mosaic.filter(x, y)].add(across * down, pixel);
-            }
-        }
-        let fluxes_adu = sums.map(|sums| sums.slope());
-        fluxes_adu
-            .iter()
-            .all(|flux| flux.is_finite())
-            .then_some(fluxes_adu)
+        fluxes_adu(self.raw, star, sigma_px, |x, y| self.mosaic.filter(x, y))
     }
+}
+
+/// The flux of a Gaussian spot, as if it were over all pixels, by those of each kind: `kind` tells it of the pixel
+/// in a column and a row.
+fn fluxes_adu<const KINDS: usize>(
+    frame: &Frame,
+    star: &PixelPoint,
+    sigma_px: f64,
+    kind: impl Fn(usize, usize) -> usize,
+) -> Option<[f64; KINDS]> {
+    /// The part of the frame that is looked at, in standard deviations from the star.
+    const REACH: f64 = 6.0;
+    let reach = (REACH * (sigma_px + 0.5)).ceil() as usize;
+    let range = |at: f64, side: usize| {
+        let first = (at.round().max(0.0) as usize).checked_sub(reach)?;
+        let end = first + 2 * reach + 1;
+        (end <= side).then_some(first..end)
+    };
+    let (columns, rows) = (range(star.x, frame.width)?, range(star.y, frame.height)?);
+    let share = |at: usize, center: f64| {
+        let cdf = |edge: f64| normal_cdf((at as f64 + edge - center) / sigma_px);
+        cdf(0.5) - cdf(-0.5)
+    };
+    let across: Vec<f64> = columns.clone().map(|x| share(x, star.x)).collect();
+    let mut sums = [Sums::default(); KINDS];
+    for y in rows {
+        let down = share(y, star.y);
+        for (x, across) in columns.clone().zip(&across) {
+            sums[kind(x, y)].add(across * down, f64::from(frame.at(x, y)));
+        }
+    }
+    let fluxes_adu = sums.map(|sums| sums.slope());
+    let is_known = fluxes_adu.iter().all(|flux| flux.is_finite());
+    is_known.then_some(fluxes_adu)
 }
 
 /// Sums over the pixels behind a filter, for the line of their levels over the share of a spot in each.

@@ -27,7 +27,7 @@ pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};
 #[doc(hidden)]
-pub use color_frame::ColorFrame;
+pub use color_frame::{ColorFrame, PictureColors};
 #[doc(hidden)]
 pub use identified_frame::IdentifiedFrame;
 

@@ -17,6 +17,7 @@ use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig, DetectError, Detections, Trail};
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
+use crate::photometry::PictureColors;
 use crate::sky::places::StarPlaces;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -71,6 +72,7 @@ pub fn solve_read(
 ) -> Result<(Solution, Frame<'static>), Error> {
     let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
+    workspace.frames.forget();
     let mut frame = read(&mut workspace.frames)?;
     // A flat evens out the levels by which a mosaic is found.
     let mosaic = Mosaic::of(&frame);
@@ -135,6 +137,7 @@ pub fn solve_frame(
 ) -> Result<Solution, DetectError> {
     let clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
+    workspace.frames.forget();
     let input = Input {
         frame,
         name: None,
@@ -238,7 +241,6 @@ fn solve(
         frame,
         calibration: input.calibration,
         mosaic,
-        color: prepared.color(),
         observation: observation(&outcome, &priors),
         priors,
         places,
@@ -259,11 +261,34 @@ fn solve(
         solved.measure_photometry();
         comparison = solved.compare_with_camera();
         if context.measure_sky || (context.measure_known_sky && solved.shows_whole_sky()) {
-            solved.measure_sky(comparison.as_ref());
+            let colors = || colors_of(&prepared, input.calibration, context, workspace);
+            solved.measure_sky(comparison.as_ref(), &colors);
         }
     }
     clock.lap(Stage::Photometry);
     Ok(solved.into_solution(comparison, clock.timing()))
+}
+
+/// Reads the colors of a frame: those behind its mosaic, or of the file of which it was read, calibrated as it was.
+fn colors_of<'a>(
+    prepared: &'a Prepared,
+    calibration: Option<&Calibration>,
+    context: &Context,
+    workspace: &Workspace,
+) -> Option<PictureColors<'a>> {
+    if let Some(raw) = prepared.color() {
+        return Some(PictureColors::Raw(raw));
+    }
+    let mut frames = workspace.frames.red_and_blue(prepared.raw())?;
+    if let Some(calibration) = calibration {
+        for frame in &mut frames {
+            calibration.apply(frame).ok()?;
+        }
+    }
+    if context.as_stored {
+        frames = frames.map(Frame::as_stored);
+    }
+    Some(PictureColors::RedAndBlue(Box::new(frames)))
 }
 
 /// The search for the stars of a frame.

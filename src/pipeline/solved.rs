@@ -17,7 +17,7 @@ use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::sky_map::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
-use crate::photometry::{self, ColorFrame, FramePhotometry, IdentifiedFrame};
+use crate::photometry::{self, FramePhotometry, IdentifiedFrame, PictureColors};
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
 use crate::sky::solar_system::moon_and_sun;
@@ -31,8 +31,6 @@ pub(super) struct SolvedFrame<'a> {
     pub calibration: Option<&'a Calibration>,
     /// What follows from the mosaic of a raw color frame.
     pub mosaic: Option<RawColor>,
-    /// The raw frame of a color camera.
-    pub color: Option<ColorFrame<'a>>,
     pub priors: Priors,
     /// Where the catalogue's stars appear.
     pub places: StarPlaces,
@@ -68,8 +66,12 @@ impl SolvedFrame<'_> {
     }
 
     /// Measures the sky at each place of an identified frame, where it is wanted, or of one whose camera is
-    /// held. `comparison` is with the stated camera.
-    pub(super) fn measure_sky(&mut self, comparison: Option<&Comparison>) {
+    /// held. `comparison` is with the stated camera, `colors` reads those of the frame.
+    pub(super) fn measure_sky<'p>(
+        &mut self,
+        comparison: Option<&Comparison>,
+        colors: &dyn Fn() -> Option<PictureColors<'p>>,
+    ) {
         let held = match self.outcome {
             Outcome::Identified(_) => None,
             Outcome::NotIdentified(_) => self.as_held(),
@@ -94,7 +96,7 @@ impl SolvedFrame<'_> {
         let picture = Picture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
-            color: self.color,
+            colors,
             dark: by_dark.or(by_camera).or(by_frame),
             usual_dark: usual.and_then(|usual| usual.dark).filter(|_| !has_flat),
             is_flat: has_flat || camera.is_some(),

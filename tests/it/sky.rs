@@ -2,6 +2,7 @@
 
 use crate::common::{Ran, number, starpipe};
 use serde_json::Value;
+use starpipe::Frame;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -251,16 +252,90 @@ fn behind_filter(camera: &Path, efficiency: &str, name: &str) -> PathBuf {
     file
 }
 
+const FILTER_NAMES: [&str; 3] = ["red.toml", "green.toml", "blue.toml"];
+
+/// The sky as a camera sees it behind red, green and blue filters.
+fn behind_filters(directory: &Path) -> [Frame<'static>; 3] {
+    let camera = described(directory);
+    [0, 1, 2].map(|filter| {
+        let camera = behind_filter(&camera, FILTERS[filter], FILTER_NAMES[filter]);
+        let file = simulated(directory, &camera, &["--force"]);
+        starpipe::frame::read(&file).unwrap()
+    })
+}
+
+/// Checks the sky's brightness, and its color: the simulated sky has that of the Sun, which the air reddens in
+/// stars by 0.08 mag.
+fn check_color(found: &Value) {
+    let zenith = number(found, "/zenith/mag_arcsec2");
+    assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
+    let (color, sigma) = (
+        number(found, "/zenith/bv_mag"),
+        number(found, "/zenith/bv_sigma_mag"),
+    );
+    assert!(
+        (color - 0.72).abs() < 2.0 * sigma && sigma < 0.2,
+        "{color} {sigma}"
+    );
+}
+
+#[test]
+fn a_color_picture_shows_the_sky_and_its_color() {
+    let directory = tempfile::tempdir().unwrap();
+    let [red, green, blue] = behind_filters(directory.path());
+    // White was balanced: red has twice its light, and twice its bias.
+    let balanced = |x: u32, y: u32| {
+        let at = |frame: &Frame| frame.at(x as usize, y as usize) as u16;
+        [2 * at(&red), at(&green), at(&blue)]
+    };
+    let picture = image::ImageBuffer::from_fn(SIDE, SIDE, |x, y| image::Rgb(balanced(x, y)));
+    let file = directory.path().join("colors.png");
+    picture.save(&file).unwrap();
+    let exposure = "--exposure=20".to_owned();
+    check_color(&sky(&file, std::slice::from_ref(&exposure)));
+
+    let planes = [&red, &green, &blue].map(|frame| frame.values().into_owned());
+    let file = directory.path().join("colors.fits");
+    fs::write(&file, fits_cube(&planes)).unwrap();
+    let camera = directory.path().join(FILTER_NAMES[1]);
+    check_color(&sky(
+        &file,
+        &[exposure, format!("--camera={}", camera.display())],
+    ));
+}
+
+/// A FITS file of three planes.
+fn fits_cube(planes: &[Vec<f32>; 3]) -> Vec<u8> {
+    const BLOCK: usize = 2880;
+    let cards = [
+        "SIMPLE  =                    T".to_owned(),
+        "BITPIX  =                  -32".to_owned(),
+        "NAXIS   =                    3".to_owned(),
+        format!("NAXIS1  = {SIDE:20}"),
+        format!("NAXIS2  = {SIDE:20}"),
+        "NAXIS3  =                    3".to_owned(),
+        "ROWORDER= 'TOP-DOWN'".to_owned(),
+        "END".to_owned(),
+    ];
+    let mut bytes: Vec<u8> = cards
+        .iter()
+        .flat_map(|card| format!("{card:80}").into_bytes())
+        .collect();
+    bytes.resize(BLOCK, b' ');
+    bytes.extend(
+        planes
+            .iter()
+            .flatten()
+            .flat_map(|level| level.to_be_bytes()),
+    );
+    bytes.resize(bytes.len().next_multiple_of(BLOCK), 0);
+    bytes
+}
+
 #[test]
 fn a_color_camera_sees_the_same_sky_and_its_color() {
     let directory = tempfile::tempdir().unwrap();
-    let camera = described(directory.path());
-    let names = ["red.toml", "green.toml", "blue.toml"];
-    let frames = [0, 1, 2].map(|filter| {
-        let camera = behind_filter(&camera, FILTERS[filter], names[filter]);
-        let file = simulated(directory.path(), &camera, &["--force"]);
-        starpipe::frame::read(&file).unwrap()
-    });
+    let frames = behind_filters(directory.path());
     // Red and blue pixels on one diagonal, green ones on the other.
     let raw = image::ImageBuffer::from_fn(SIDE, SIDE, |x, y| {
         let filter = match (x % 2, y % 2) {
@@ -272,23 +347,13 @@ fn a_color_camera_sees_the_same_sky_and_its_color() {
     });
     let file = directory.path().join("raw.png");
     raw.save(&file).unwrap();
-    let green = directory.path().join(names[1]);
+    let green = directory.path().join(FILTER_NAMES[1]);
     let options = [
         format!("--camera={}", green.display()),
         "--exposure=20".to_owned(),
     ];
     let found = sky(&file, &options);
-    let zenith = number(&found, "/zenith/mag_arcsec2");
-    assert!((zenith - SKY_MAG).abs() < 0.06, "{zenith}");
-    // The simulated sky has the color of the Sun, which the air reddens in stars by 0.08 mag.
-    let (color, sigma) = (
-        number(&found, "/zenith/bv_mag"),
-        number(&found, "/zenith/bv_sigma_mag"),
-    );
-    assert!(
-        (color - 0.72).abs() < 2.0 * sigma && sigma < 0.2,
-        "{color} {sigma}"
-    );
+    check_color(&found);
     let high = |cell: &Value| number(cell, "/altitude_deg/0") >= 30.0;
     let limits = cells(&found, high).filter_map(|cell| {
         Some(cell["limit_vmag"].as_f64()? - cell["expected_limit_vmag"].as_f64()?)

@@ -10,7 +10,7 @@ use crate::frame::levels::{LevelSamples, WholeNumber, frame_from_floats, frame_f
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.
-pub(super) struct Image {
+pub(super) struct Image<'a> {
     layout: FitsLayout,
     /// Its plane in the header-data unit, from 0.
     plane: usize,
@@ -19,16 +19,17 @@ pub(super) struct Image {
     zero: f64,
     /// The stored integer that marks a pixel without a value.
     blank: Option<i64>,
+    account: &'a Account,
 }
 
-impl Image {
+impl<'a> Image<'a> {
     /// The image `plane` of `unit`, which has this layout. A cube has several planes, and one must be
     /// chosen.
     pub fn new(
         unit: &FitsUnit,
         layout: FitsLayout,
         plane: Option<usize>,
-        account: &Account,
+        account: &'a Account,
     ) -> Result<Self, FrameError> {
         if plane.is_none() && layout.is_cube() {
             let axes: Vec<String> = unit.axes.iter().map(usize::to_string).collect();
@@ -54,6 +55,7 @@ impl Image {
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
             blank: unit.blank().filter(|_| !unit.stored.is_float()),
+            account,
         };
         let bytes_per_pixel = image.bytes_per_pixel(unit.is_compressed_image());
         account.check_image(Size::new(width, height), bytes_per_pixel)?;
@@ -79,17 +81,12 @@ impl Image {
     }
 
     /// Decodes the image from `unit`, of which it was made, in `bytes`, the content of the file.
-    pub fn frame(
-        &self,
-        unit: &FitsUnit,
-        bytes: &[u8],
-        account: &Account,
-    ) -> Result<Frame<'static>, FrameError> {
+    pub fn frame(&self, unit: &FitsUnit, bytes: &[u8]) -> Result<Frame<'static>, FrameError> {
         let values = self.layout.values();
         let first = values.saturating_mul(self.plane);
         if unit.is_compressed_image() {
             let range = first..first.saturating_add(values);
-            return self.frame_of(&tiles::unpack(unit, bytes, range, account)?);
+            return self.frame_of(&tiles::unpack(unit, bytes, range, self.account)?);
         }
         let before = first.saturating_mul(self.stored.bytes());
         let start = unit.data.saturating_add(before);
@@ -156,7 +153,7 @@ impl Image {
             values: &values,
             channels,
         };
-        let frame = frame_from_integers(&samples, full_scale)?;
+        let frame = frame_from_integers(&samples, full_scale, self.account)?;
         let Some(blank) = self.blank else {
             return Ok(frame);
         };
@@ -219,6 +216,6 @@ impl Image {
             ..
         } = self.layout;
         let values = self.layout.interleaved(levels);
-        frame_from_floats(Size::new(width, height), channels, values)
+        frame_from_floats(Size::new(width, height), channels, values, self.account)
     }
 }

@@ -70,7 +70,7 @@ pub(super) fn decode(
     metadata.ignored.extend(unit.ignored_blanks());
     metadata.choice = choice;
     metadata.assumed.extend(assumed);
-    let mut frame = image.frame(&unit, bytes, account)?;
+    let mut frame = image.frame(&unit, bytes)?;
     overscan::take(&mut frame, &keywords, &mut metadata, account)?;
     if let Some(stated) = keywords::saturation(&keywords) {
         stated.apply(&mut frame, &mut metadata);

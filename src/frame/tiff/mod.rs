@@ -85,37 +85,47 @@ pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<Fra
 
 impl Layout<'_> {
     fn frame(&self, source: ChunkSource) -> Result<Frame<'static>, FrameError> {
+        let account = source.account;
         let full = self.depth.full_scale();
         // Values of more than 24 bits are rounded.
-        let rounded = |values: Vec<f32>| Ok(self.floats(values)?.with_levels(1.0, None));
+        let rounded = |values: Vec<f32>| Ok(self.floats(values, account)?.with_levels(1.0, None));
         match (self.depth.format, self.depth.bits) {
             (SampleFormat::Unsigned, ..=8) => {
-                self.integers(&self.samples::<u8>(source)?, full as u8)
+                self.integers(&self.samples::<u8>(source)?, full as u8, account)
             }
             (SampleFormat::Unsigned, ..=16) => {
-                self.integers(&self.samples::<u16>(source)?, full as u16)
+                self.integers(&self.samples::<u16>(source)?, full as u16, account)
             }
             (SampleFormat::Unsigned, ..=32) => {
-                self.integers(&self.samples::<u32>(source)?, full as u32)
+                self.integers(&self.samples::<u32>(source)?, full as u32, account)
             }
             (SampleFormat::Unsigned, _) => rounded(self.samples_as(source, |v: u64| v as f32)?),
             (SampleFormat::Signed, ..=8) => {
-                self.integers(&self.samples_as(source, |v: u8| v as i8)?, i8::MAX)
+                self.integers(&self.samples_as(source, |v: u8| v as i8)?, i8::MAX, account)
             }
-            (SampleFormat::Signed, ..=16) => {
-                self.integers(&self.samples_as(source, |v: u16| v as i16)?, i16::MAX)
-            }
-            (SampleFormat::Signed, ..=32) => {
-                self.integers(&self.samples_as(source, |v: u32| v as i32)?, i32::MAX)
-            }
+            (SampleFormat::Signed, ..=16) => self.integers(
+                &self.samples_as(source, |v: u16| v as i16)?,
+                i16::MAX,
+                account,
+            ),
+            (SampleFormat::Signed, ..=32) => self.integers(
+                &self.samples_as(source, |v: u32| v as i32)?,
+                i32::MAX,
+                account,
+            ),
             (SampleFormat::Signed, _) => {
                 rounded(self.samples_as(source, |v: u64| v as i64 as f32)?)
             }
-            (SampleFormat::Float, ..=16) => self.floats(self.samples_as(source, float_of_half)?),
-            (SampleFormat::Float, ..=32) => self.floats(self.samples_as(source, f32::from_bits)?),
-            (SampleFormat::Float, _) => {
-                self.floats(self.samples_as(source, |v: u64| f64::from_bits(v) as f32)?)
+            (SampleFormat::Float, ..=16) => {
+                self.floats(self.samples_as(source, float_of_half)?, account)
             }
+            (SampleFormat::Float, ..=32) => {
+                self.floats(self.samples_as(source, f32::from_bits)?, account)
+            }
+            (SampleFormat::Float, _) => self.floats(
+                self.samples_as(source, |v: u64| f64::from_bits(v) as f32)?,
+                account,
+            ),
         }
     }
 
@@ -132,6 +142,7 @@ impl Layout<'_> {
         &self,
         values: &[T],
         full_scale: T,
+        account: &Account,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.width,
@@ -139,15 +150,19 @@ impl Layout<'_> {
             values,
             channels: self.channels,
         };
-        frame_from_integers(&samples, full_scale)
+        frame_from_integers(&samples, full_scale, account)
     }
 
-    fn floats(&self, mut values: Vec<f32>) -> Result<Frame<'static>, FrameError> {
+    fn floats(
+        &self,
+        mut values: Vec<f32>,
+        account: &Account,
+    ) -> Result<Frame<'static>, FrameError> {
         if self.color == Color::WhiteIsZero {
             values.iter_mut().for_each(|value| *value = 1.0 - *value);
         }
         let size = Size::new(self.width, self.height);
-        frame_from_floats(size, self.channels, values)
+        frame_from_floats(size, self.channels, values, account)
     }
 }
 

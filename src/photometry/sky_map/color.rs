@@ -1,12 +1,13 @@
-//! The color of the sky's light: its ratio behind two filters of a raw color frame, as stars show it.
+//! The color of the sky's light: its ratio behind two filters of a color camera, as stars show it.
 
-use super::dark_level::DarkLevel;
+use super::dark_level::{DarkLevel, DarkSource};
 use super::picture::Picture;
 use super::stars::SkyStar;
 use crate::base::statistics::Estimate;
 use crate::detect::BackgroundMap;
+use crate::frame::Frame;
 use crate::photometry::zero_point::{self, StandardStar};
-use crate::photometry::{ColorFrame, IdentifiedFrame, instrumental_mag};
+use crate::photometry::{IdentifiedFrame, PictureColors, instrumental_mag};
 
 /// Side of the cells in which the background behind a filter is measured, in its pixels.
 const MESH_PX: usize = 32;
@@ -17,7 +18,7 @@ pub(super) struct ColorIndex(zero_point::ColorIndex);
 
 impl ColorIndex {
     /// By the colors of stars at the ground.
-    fn of(color: &ColorFrame, stars: &[SkyStar], spot_sigma_px: f64) -> Option<Self> {
+    fn of(colors: &PictureColors, stars: &[SkyStar], spot_sigma_px: f64) -> Option<Self> {
         /// Stars with a larger error, in magnitudes, tell little.
         const LARGEST_SIGMA_MAG: f64 = 0.25;
         /// Reddening by the air in B−V, per airmass (Patat et al. 2011, A&A 527, A91).
@@ -27,11 +28,11 @@ impl ColorIndex {
             if sigma_mag > LARGEST_SIGMA_MAG {
                 return None;
             }
-            let [_, first, second] = color.fluxes_adu(&star.pixel, spot_sigma_px)?;
+            let fluxes_adu = colors.fluxes_adu(&star.pixel, spot_sigma_px)?;
             Some(StandardStar {
                 v_mag: star.v_mag,
                 bv_mag: Some(star.bv_mag? + REDDENING_MAG * star.airmass.unwrap_or(0.0)),
-                instrumental_mag: star.v_mag - ratio_mag([first, second])?,
+                instrumental_mag: star.v_mag - ratio_mag(fluxes_adu)?,
                 sigma_mag,
                 off_centre_sq: star.off_centre_sq,
             })
@@ -61,27 +62,36 @@ fn ratio_mag([first, second]: [f64; 2]) -> Option<f64> {
 pub(super) struct SkyColors {
     /// How its light tells its color.
     pub index: ColorIndex,
-    dark_adu: f64,
+    darks_adu: [f64; 2],
+    /// Pixels of the frame for one of theirs, on each axis.
+    pixels_of_one: usize,
     backgrounds: [BackgroundMap; 2],
     rows: [Vec<f32>; 2],
 }
 
 impl SkyColors {
-    /// Those of a raw color frame whose level without light is known.
+    /// Those of a color picture whose level without light is known.
     pub(super) fn of(
         frame: &IdentifiedFrame,
         picture: &Picture,
         dark: Option<&DarkLevel>,
         stars: &[SkyStar],
     ) -> Option<Self> {
-        let color = picture.color.as_ref()?;
-        let dark_adu = dark?.adu.value;
-        let index = ColorIndex::of(color, stars, frame.detections.spot_sigma_px)?;
-        let under = |filter| color.mosaic.pixels_under(filter, color.raw);
-        let frames = [under(1)?, under(2)?];
+        let dark = dark?;
+        let colors = (picture.colors)()?;
+        let index = ColorIndex::of(&colors, stars, frame.detections.spot_sigma_px)?;
+        let frames = colors.frames()?;
+        // A program that balances white may multiply this level, too.
+        let is_of_each = dark.source == DarkSource::Unlit && colors.pixels_of_one() == 1;
+        let dark_adu = |frame_of_one: &Frame| {
+            let own = || DarkLevel::of_unlit_pixels(frame_of_one, frame.detections);
+            let own = is_of_each.then(own).flatten();
+            own.as_ref().unwrap_or(dark).adu.value
+        };
         Some(Self {
             index,
-            dark_adu,
+            darks_adu: frames.each_ref().map(|frame| dark_adu(frame)),
+            pixels_of_one: colors.pixels_of_one(),
             rows: frames.each_ref().map(|frame| vec![0.0; frame.width]),
             backgrounds: frames.map(|frame| BackgroundMap::measure(&frame, MESH_PX)),
         })
@@ -90,15 +100,16 @@ impl SkyColors {
     /// Goes to a row of the frame.
     pub(super) fn set_row(&mut self, y: usize) {
         for (background, row) in self.backgrounds.iter().zip(&mut self.rows) {
-            background.row(y / 2, row);
+            background.row(y / self.pixels_of_one, row);
         }
     }
 
     /// The light behind the filters in a column of this row, in ADU.
     pub(super) fn at(&self, x: usize) -> [f64; 2] {
-        self.rows.each_ref().map(|row| {
-            let at = (x / 2).min(row.len() - 1);
-            f64::from(row[at]) - self.dark_adu
+        std::array::from_fn(|filter| {
+            let row = &self.rows[filter];
+            let at = (x / self.pixels_of_one).min(row.len() - 1);
+            f64::from(row[at]) - self.darks_adu[filter]
         })
     }
 }

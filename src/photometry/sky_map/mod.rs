@@ -11,7 +11,7 @@
 //!    probability that it is hardly any (`clouds`); so does the light of clouds, where it goes with missing
 //!    stars (`cloud_light`).
 //! 4. The background above the bias, over the solid angle of a pixel, is the sky's brightness
-//!    (`brightness`). In raw frames of color cameras, two filters tell its color (`color`).
+//!    (`brightness`). Where a frame has colors, two filters tell that of the sky (`color`).
 //! 5. The threshold and the extinction of a cell tell how faint its stars should go, and the stars around it
 //!    how faint they go (`limits`).
 //!
@@ -126,7 +126,11 @@ pub fn measure(
         false => DarkLevel::of_unlit_pixels(picture.frame, frame.detections),
     };
     let dark = picture.dark.or_else(unlit).or(picture.usual_dark);
-    let color = color::SkyColors::of(frame, picture, dark.as_ref(), &stars);
+    let no_brightness = brightness::refusal(dark.as_ref(), &clear_sky);
+    let color = match no_brightness {
+        None => color::SkyColors::of(frame, picture, dark.as_ref(), &stars),
+        Some(_) => None,
+    };
     let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
@@ -146,7 +150,6 @@ pub fn measure(
         share,
     } = sky.clouds(&witnesses, &levels);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
-    let no_brightness = brightness::refusal(dark.as_ref(), &clear_sky);
     let light = |cell: usize| match no_brightness {
         None => levels.light(cell, &clear_sky),
         Some(_) => None,

@@ -3,17 +3,17 @@
 use super::dark_level::DarkLevel;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::frame::Frame;
-use crate::photometry::ColorFrame;
+use crate::photometry::PictureColors;
 
 /// A frame's pixels, and what is known of their light.
 #[doc(hidden)]
-pub struct Picture<'a> {
+pub struct Picture<'a, 'p> {
     /// The calibrated frame, without a mosaic.
     pub frame: &'a Frame<'a>,
     /// What fluxes were multiplied with: levels are as well.
     pub flux_scale: f64,
-    /// The raw frame of a color camera.
-    pub color: Option<ColorFrame<'a>>,
+    /// Reads its colors, where it has some.
+    pub colors: &'a dyn Fn() -> Option<PictureColors<'p>>,
     /// Level of a pixel without light, where it is stated.
     pub dark: Option<DarkLevel>,
     /// The same by other frames, where this one does not tell it.
