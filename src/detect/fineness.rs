@@ -58,7 +58,7 @@ impl CellSize {
         let pass = &searched.pass;
         let tried = Tried {
             cell_px: self.px,
-            limit_adu: pass.threshold_level * background.median_sigma_adu / pass.matched_gain,
+            limit_adu: pass.limit_adu(background.median_sigma_adu),
         };
         if let Some(coarser) = self.coarser
             && tried.limit_adu > WORTHWHILE * coarser.limit_adu

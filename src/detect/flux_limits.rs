@@ -3,7 +3,6 @@
 use super::background::Mesh;
 use super::pixels::View;
 use crate::base::coords::PixelPoint;
-use crate::base::statistics::median;
 
 /// The flux at which half of the stars are detected, in parts of the frame.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -12,19 +11,23 @@ pub(crate) struct FluxLimits {
     parts: [usize; 2],
     /// Row by row, in ADU.
     adu: Vec<f32>,
+    /// That of the frame's stated noise and threshold.
+    typical_adu: f64,
 }
 
 impl FluxLimits {
     /// Sets those of a frame that was searched with a `threshold` over the noise of the filtered frame, which
     /// edges, clouds and crowds of faint stars raise. A star whose flux is the noise of a pixel has the
-    /// signal-to-noise ratio `gain`.
+    /// signal-to-noise ratio `gain`; `typical_adu` is that of the frame's stated noise and threshold.
     pub(super) fn set(
         &mut self,
         view: &View,
         [background, filtered]: [&Mesh; 2],
         threshold: f64,
         gain: f64,
+        typical_adu: f64,
     ) {
+        self.typical_adu = typical_adu;
         let grid = &background.grid;
         self.parts = [grid.columns, grid.rows];
         self.adu.clear();
@@ -46,6 +49,7 @@ impl FluxLimits {
 
     /// Multiplies all by `factor`.
     pub(crate) fn scale(&mut self, factor: f64) {
+        self.typical_adu *= factor;
         for limit in &mut self.adu {
             *limit *= factor as f32;
         }
@@ -57,10 +61,9 @@ impl FluxLimits {
         self.adu.clear();
     }
 
-    /// Their median; `None` where nothing was searched.
-    pub(crate) fn median(&self) -> Option<f64> {
-        let mut limits: Vec<f64> = self.adu.iter().map(|adu| f64::from(*adu)).collect();
-        (!limits.is_empty()).then(|| median(&mut limits))
+    /// That of the noise and the threshold that are stated for the frame; `None` where nothing was searched.
+    pub(crate) fn typical(&self) -> Option<f64> {
+        (!self.adu.is_empty()).then_some(self.typical_adu)
     }
 
     /// The flux at a place of a frame of this size, in ADU; `None` where nothing was searched.

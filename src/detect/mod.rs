@@ -191,9 +191,14 @@ fn run(
     set_levels(found, background, &searched);
     let meshes = [&background.mesh, &search.filtered.mesh];
     let pass = &searched.pass;
-    found
-        .flux_limits
-        .set(&view, meshes, pass.threshold, pass.matched_gain);
+    let typical_adu = pass.limit_adu(background.median_sigma_adu);
+    found.flux_limits.set(
+        &view,
+        meshes,
+        pass.threshold,
+        pass.matched_gain,
+        typical_adu,
+    );
     if !measure_trails(&input, search, &searched, found)? {
         measure_spots(&input, search, searched, measure, found)?;
     }

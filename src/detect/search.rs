@@ -112,6 +112,14 @@ pub(crate) struct FilterPass {
     pub noise_tail: Option<NoiseTail>,
 }
 
+impl FilterPass {
+    /// Flux at which half of the stars are detected where pixels have the noise `noise_adu`, and the threshold is
+    /// that level, in ADU.
+    pub fn limit_adu(&self, noise_adu: f64) -> f64 {
+        self.threshold_level * noise_adu / self.matched_gain
+    }
+}
+
 /// What bright stars say about a frame.
 enum StarEstimate {
     /// Size and noise model are final.

@@ -50,7 +50,7 @@ impl IdentifiedFrame<'_> {
             self.places.airmass(&direction)
         };
         let central_airmass = airmass(&camera.centre())?;
-        let typical_adu = self.detections.flux_limits.median()?;
+        let typical_adu = self.detections.flux_limits.typical()?;
         let offset = |place: usize| (place as f64 + 0.5) / PLACES as f64;
         let place = |number: usize| {
             let place = number * STEP % (PLACES * PLACES);

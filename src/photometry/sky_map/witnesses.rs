@@ -53,7 +53,7 @@ impl Sky<'_> {
     /// V magnitude of a star in clear air at the frame's centre and at the typical threshold: for these the
     /// limit is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
-        let limit_adu = self.frame.detections.flux_limits.median()?;
+        let limit_adu = self.frame.detections.flux_limits.typical()?;
         let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
         Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
     }
