@@ -1,6 +1,6 @@
 //! Frame files through the program: every format at its depth, and bad files.
 
-use crate::common::{Ran, fixture, number, starpipe};
+use crate::common::{Ran, fits_unit, fixture, number, starpipe};
 use image::{DynamicImage, ImageFormat};
 use serde_json::Value;
 use starpipe::frame;
@@ -42,29 +42,6 @@ fn by_image(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     image.write_to(&mut out, format).unwrap();
     out.into_inner()
-}
-
-/// A header-data unit of FITS; `first` is the first card.
-fn fits_unit(first: &str, bitpix: i32, axes: &[u32], more: &[&str], data: &[u8]) -> Vec<u8> {
-    let mut cards = vec![
-        first.to_owned(),
-        format!("BITPIX  = {bitpix:20}"),
-        format!("NAXIS   = {:20}", axes.len()),
-    ];
-    for (number, length) in axes.iter().enumerate() {
-        cards.push(format!("NAXIS{:<3}= {length:20}", number + 1));
-    }
-    cards.extend(more.iter().map(|card| (*card).to_owned()));
-    if !more.iter().any(|card| card.starts_with("ROWORDER")) {
-        cards.push("ROWORDER= 'TOP-DOWN'".to_owned());
-    }
-    cards.push("END".to_owned());
-    let text: String = cards.iter().map(|card| format!("{card:<80}")).collect();
-    let mut bytes = text.into_bytes();
-    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
-    bytes.extend(data);
-    bytes.resize(bytes.len().next_multiple_of(2880), 0);
-    bytes
 }
 
 fn fits(bitpix: i32, (width, height): (u32, u32), more: &[&str], data: &[u8]) -> Vec<u8> {

@@ -2,7 +2,7 @@
 
 #![cfg(unix)]
 
-use crate::common::{Ran, orion, starpipe};
+use crate::common::{Ran, fits_header, orion, starpipe};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use std::fs;
@@ -103,19 +103,15 @@ fn measured(command: &mut Command) -> (Option<i32>, u64) {
 
 #[test]
 fn content_behind_an_image_is_unpacked_only_so_far() {
-    let mut header = [
-        "SIMPLE  =                    T",
-        "BITPIX  =                    8",
-        "NAXIS   =                    2",
-        "NAXIS1  =                   64",
-        "NAXIS2  =                   64",
-        "END",
-    ]
-    .map(|card| format!("{card:<80}"))
-    .concat();
-    header += &" ".repeat(2880 - header.len());
+    let header = fits_header(&[
+        card("SIMPLE", "T"),
+        card("BITPIX", "8"),
+        card("NAXIS", "2"),
+        card("NAXIS1", "64"),
+        card("NAXIS2", "64"),
+    ]);
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-    encoder.write_all(header.as_bytes()).unwrap();
+    encoder.write_all(&header).unwrap();
     let block = vec![0; 1 << 20];
     for _ in 0..64 {
         encoder.write_all(&block).unwrap();
@@ -234,15 +230,6 @@ fn a_crowded_picture_takes_no_more_memory_than_it_may() {
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     let ran = with_memory("200");
     assert_eq!(ran.status, 3, "{}", ran.stderr);
-}
-
-/// Cards as a header, and blanks to its end.
-fn fits_header(cards: &[String]) -> Vec<u8> {
-    let end = "END".to_owned();
-    let cards = cards.iter().chain([&end]).map(|card| format!("{card:<80}"));
-    let mut header = cards.collect::<String>().into_bytes();
-    header.resize(header.len().next_multiple_of(2880), b' ');
-    header
 }
 
 fn card(keyword: &str, value: &str) -> String {

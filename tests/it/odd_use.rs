@@ -512,32 +512,25 @@ fn a_bug_that_one_list_or_one_image_of_a_file_meets_ends_that_alone() {
 
 /// An image of a FITS file: a header that begins with `first`, and noise.
 #[cfg(debug_assertions)]
-fn noise_image(first: &str, width: usize, height: usize) -> Vec<u8> {
-    let mut cards = vec![first.to_owned()];
-    let values = [
-        ("BITPIX", 16),
-        ("NAXIS", 2),
-        ("NAXIS1", width),
-        ("NAXIS2", height),
-    ];
-    cards.extend(values.map(|(name, value)| format!("{name:8}= {value:20}")));
-    if first.starts_with("XTENSION") {
-        cards.extend(
-            [("PCOUNT", 0), ("GCOUNT", 1)].map(|(name, value)| format!("{name:8}= {value:20}")),
-        );
-    }
-    cards.push("END".to_owned());
-    let mut bytes: Vec<u8> = cards
-        .iter()
-        .flat_map(|card| format!("{card:80}").into_bytes())
-        .collect();
-    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
+fn noise_image(first: &str, width: u32, height: u32) -> Vec<u8> {
+    let more: &[&str] = match first.starts_with("XTENSION") {
+        true => &[
+            "PCOUNT  =                    0",
+            "GCOUNT  =                    1",
+        ],
+        false => &[],
+    };
     // Linear congruential: any noise will do.
     let mut state = 1_u32;
-    bytes.extend((0..width * height).flat_map(|_| {
+    let levels = (0..width * height).flat_map(|_| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         [3, (state >> 24) as u8]
-    }));
-    bytes.resize(bytes.len().next_multiple_of(2880), 0);
-    bytes
+    });
+    crate::common::fits_unit(
+        first,
+        16,
+        &[width, height],
+        more,
+        &levels.collect::<Vec<u8>>(),
+    )
 }

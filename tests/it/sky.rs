@@ -1,6 +1,6 @@
 //! `starpipe sky` on simulated all-sky frames.
 
-use crate::common::{Ran, number, starpipe};
+use crate::common::{Ran, fits_unit, number, starpipe};
 use serde_json::Value;
 use starpipe::Frame;
 use std::fs;
@@ -295,41 +295,21 @@ fn a_color_picture_shows_the_sky_and_its_color() {
     check_color(&sky(&file, std::slice::from_ref(&exposure)));
 
     let planes = [&red, &green, &blue].map(|frame| frame.values().into_owned());
+    let levels = planes
+        .iter()
+        .flatten()
+        .flat_map(|level| level.to_be_bytes());
+    let (first, levels) = (
+        "SIMPLE  =                    T",
+        levels.collect::<Vec<u8>>(),
+    );
     let file = directory.path().join("colors.fits");
-    fs::write(&file, fits_cube(&planes)).unwrap();
+    fs::write(&file, fits_unit(first, -32, &[SIDE, SIDE, 3], &[], &levels)).unwrap();
     let camera = directory.path().join(FILTER_NAMES[1]);
     check_color(&sky(
         &file,
         &[exposure, format!("--camera={}", camera.display())],
     ));
-}
-
-/// A FITS file of three planes.
-fn fits_cube(planes: &[Vec<f32>; 3]) -> Vec<u8> {
-    const BLOCK: usize = 2880;
-    let cards = [
-        "SIMPLE  =                    T".to_owned(),
-        "BITPIX  =                  -32".to_owned(),
-        "NAXIS   =                    3".to_owned(),
-        format!("NAXIS1  = {SIDE:20}"),
-        format!("NAXIS2  = {SIDE:20}"),
-        "NAXIS3  =                    3".to_owned(),
-        "ROWORDER= 'TOP-DOWN'".to_owned(),
-        "END".to_owned(),
-    ];
-    let mut bytes: Vec<u8> = cards
-        .iter()
-        .flat_map(|card| format!("{card:80}").into_bytes())
-        .collect();
-    bytes.resize(BLOCK, b' ');
-    bytes.extend(
-        planes
-            .iter()
-            .flatten()
-            .flat_map(|level| level.to_be_bytes()),
-    );
-    bytes.resize(bytes.len().next_multiple_of(BLOCK), 0);
-    bytes
 }
 
 #[test]

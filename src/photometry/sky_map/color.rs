@@ -8,6 +8,7 @@ use crate::detect::BackgroundMap;
 use crate::frame::Frame;
 use crate::photometry::zero_point::{self, StandardStar};
 use crate::photometry::{IdentifiedFrame, PictureColors, instrumental_mag};
+use std::borrow::Cow;
 
 /// Side of the cells in which the background behind a filter is measured, in its pixels.
 const MESH_PX: usize = 32;
@@ -62,11 +63,17 @@ fn ratio_mag([first, second]: [f64; 2]) -> Option<f64> {
 pub(super) struct SkyColors {
     /// How its light tells its color.
     pub index: ColorIndex,
-    darks_adu: [f64; 2],
     /// Pixels of the frame for one of theirs, on each axis.
     pixels_of_one: usize,
-    backgrounds: [BackgroundMap; 2],
-    rows: [Vec<f32>; 2],
+    filters: [FilteredSky; 2],
+}
+
+/// The sky behind a filter.
+struct FilteredSky {
+    dark_adu: f64,
+    background: BackgroundMap,
+    /// A row of the background.
+    row: Vec<f32>,
 }
 
 impl SkyColors {
@@ -83,33 +90,34 @@ impl SkyColors {
         let frames = colors.frames()?;
         // A program that balances white may multiply this level, too.
         let is_of_each = dark.source == DarkSource::Unlit && colors.pixels_of_one() == 1;
-        let dark_adu = |frame_of_one: &Frame| {
-            let own = || DarkLevel::of_unlit_pixels(frame_of_one, frame.detections);
+        let behind = |filtered: Cow<Frame>| {
+            let own = || DarkLevel::of_unlit_pixels(&filtered, frame.detections);
             let own = is_of_each.then(own).flatten();
-            own.as_ref().unwrap_or(dark).adu.value
+            FilteredSky {
+                dark_adu: own.as_ref().unwrap_or(dark).adu.value,
+                background: BackgroundMap::measure(&filtered, MESH_PX),
+                row: vec![0.0; filtered.width],
+            }
         };
         Some(Self {
             index,
-            darks_adu: frames.each_ref().map(|frame| dark_adu(frame)),
             pixels_of_one: colors.pixels_of_one(),
-            rows: frames.each_ref().map(|frame| vec![0.0; frame.width]),
-            backgrounds: frames.map(|frame| BackgroundMap::measure(&frame, MESH_PX)),
+            filters: frames.map(behind),
         })
     }
 
     /// Goes to a row of the frame.
     pub(super) fn set_row(&mut self, y: usize) {
-        for (background, row) in self.backgrounds.iter().zip(&mut self.rows) {
-            background.row(y / self.pixels_of_one, row);
+        for sky in &mut self.filters {
+            sky.background.row(y / self.pixels_of_one, &mut sky.row);
         }
     }
 
     /// The light behind the filters in a column of this row, in ADU.
     pub(super) fn at(&self, x: usize) -> [f64; 2] {
-        std::array::from_fn(|filter| {
-            let row = &self.rows[filter];
-            let at = (x / self.pixels_of_one).min(row.len() - 1);
-            f64::from(row[at]) - self.darks_adu[filter]
+        self.filters.each_ref().map(|sky| {
+            let at = (x / self.pixels_of_one).min(sky.row.len() - 1);
+            f64::from(sky.row[at]) - sky.dark_adu
         })
     }
 }

@@ -56,6 +56,35 @@ pub fn sky() -> &'static IndexedCatalog<'static> {
     SKY.get_or_init(|| IndexedCatalog::build(Catalog::built_in(), &|_| ()))
 }
 
+/// Cards as a header of FITS, and blanks to its end.
+pub fn fits_header(cards: &[String]) -> Vec<u8> {
+    let end = "END".to_owned();
+    let cards = cards.iter().chain([&end]).map(|card| format!("{card:<80}"));
+    let mut header = cards.collect::<String>().into_bytes();
+    header.resize(header.len().next_multiple_of(2880), b' ');
+    header
+}
+
+/// A header-data unit of FITS; `first` is the first card.
+pub fn fits_unit(first: &str, bitpix: i32, axes: &[u32], more: &[&str], data: &[u8]) -> Vec<u8> {
+    let mut cards = vec![
+        first.to_owned(),
+        format!("BITPIX  = {bitpix:20}"),
+        format!("NAXIS   = {:20}", axes.len()),
+    ];
+    for (number, length) in axes.iter().enumerate() {
+        cards.push(format!("NAXIS{:<3}= {length:20}", number + 1));
+    }
+    cards.extend(more.iter().map(|card| (*card).to_owned()));
+    if !more.iter().any(|card| card.starts_with("ROWORDER")) {
+        cards.push("ROWORDER= 'TOP-DOWN'".to_owned());
+    }
+    let mut bytes = fits_header(&cards);
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(2880), 0);
+    bytes
+}
+
 /// A finished run, with its output as text.
 pub struct Ran {
     pub status: i32,
