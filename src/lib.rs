@@ -91,6 +91,7 @@ pub mod sky;
 pub mod study;
 pub mod track;
 
+pub use base::clock::UtcOffset;
 pub use base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 pub use base::epoch::{DateError, ObservationDate};
 pub use base::interrupt::{Interrupt, Interrupted};

@@ -128,10 +128,10 @@ fn context_of(header: &Header, indexed: &'static IndexedCatalog<'static>) -> Con
         });
     }
     if header.knows(2) {
-        context.priors.date = "2024-08-12T22:15:00Z".parse().ok().map(|date| FrameDate {
-            date,
-            source: DateSource::User,
-        });
+        context.priors.date = "2024-08-12T22:15:00Z"
+            .parse()
+            .ok()
+            .map(|date| FrameDate::stated(date, DateSource::User));
     }
     if header.knows(3) {
         context.priors.site = Site::new(45.0, 7.0, 300.0).ok();

@@ -8,7 +8,7 @@ use starpipe::identify::Effort;
 use starpipe::pipeline::SolveOptions;
 use starpipe::sky::observer::Air;
 use starpipe::sky::places::AttitudeFrame;
-use starpipe::{ObservationDate, Site};
+use starpipe::{ObservationDate, Site, UtcOffset};
 
 /// The options as Python has checked them; `None` stands for the default.
 #[derive(Debug, FromPyObject)]
@@ -20,6 +20,7 @@ pub struct Options {
     near_deg: Option<[f64; 2]>,
     radius_deg: f64,
     date: Option<String>,
+    utc_offset: Option<String>,
     site: Option<[f64; 3]>,
     air: Option<[f64; 2]>,
     velocity_km_s: Option<[f64; 3]>,
@@ -54,6 +55,8 @@ impl Options {
         options.near_deg = self.near_deg;
         options.radius_deg = self.radius_deg;
         options.date = date.transpose().map_err(exception)?;
+        let offset = self.utc_offset.as_deref().map(str::parse::<UtcOffset>);
+        options.utc_offset = offset.transpose().map_err(exception)?;
         let site = site.transpose().map_err(exception)?;
         let air = self.air.map(|[hpa, celsius]| Air::new(hpa, celsius));
         options.site = site.map(|site| air.map_or(site, |air| site.with_air(air)));

@@ -156,6 +156,13 @@ def air_at_site(air: Any, site: Any) -> tuple[float, float] | None:
     return hpa, celsius
 
 
+def utc_offset_text(offset: Any) -> str | None:
+    """Return what local times are ahead of UTC, as the command line takes it."""
+    if offset is None or isinstance(offset, str):
+        return offset
+    return str(within(offset, "h", "utc_offset", -14.0, 14.0))
+
+
 def velocity_km_s(velocity: Any) -> tuple[float, float, float] | None:
     """Return a velocity in km/s along three axes."""
     if velocity is None:

@@ -16,6 +16,7 @@ from ._hints import (
     iso_date,
     pixel_angle,
     positive,
+    utc_offset_text,
     velocity_km_s,
     whole_number,
     within,
@@ -50,6 +51,9 @@ class SolveOptions(TypedDict, total=False):
         How far from there it may lie, in degrees; 10 by default.
     date : Time, datetime or str
         When the frame was taken, in UTC. By default of the header or the file's name.
+    utc_offset : Quantity, float or "auto"
+        How many hours local times are ahead of UTC: those in names of files and in Exif, unless they say.
+        "auto" finds it by the stars over `site`.
     site : EarthLocation or (latitude, longitude[, height])
         Where it was taken, in degrees and metres.
     air : (pressure, temperature)
@@ -96,6 +100,7 @@ class SolveOptions(TypedDict, total=False):
     near: SkyCoord | tuple[float, float] | None
     radius: Angle | Quantity | float
     date: DateLike | None
+    utc_offset: Quantity | float | Literal["auto"] | None
     site: EarthLocation | tuple[float, ...] | None
     air: tuple[Quantity | float, Quantity | float] | None
     velocity: CartesianRepresentation | Quantity | ArrayLike | None
@@ -125,6 +130,7 @@ def solve_options(
     near: Any = None,
     radius: Any = RADIUS_DEG,
     date: Any = None,
+    utc_offset: Any = None,
     site: Any = None,
     air: Any = None,
     velocity: Any = None,
@@ -157,6 +163,7 @@ def solve_options(
         "near_deg": direction(near),
         "radius_deg": positive(radius, "deg", "radius", 180.000001),
         "date": iso_date(date),
+        "utc_offset": utc_offset_text(utc_offset),
         "site": geodetic(site),
         "air": air_at_site(air, site),
         "velocity_km_s": velocity_km_s(velocity),

@@ -29,7 +29,6 @@ pub struct Configuration {
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[expect(missing_docs, reason = "named as the options of `night`")]
 pub struct NightConfiguration {
-    pub utc_offset_h: Option<f64>,
     pub mask_hot_pixels: bool,
 }
 

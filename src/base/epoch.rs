@@ -63,15 +63,22 @@ impl ObservationDate {
     ///
     /// `None` where a name holds two different days. Parts of longer numbers are ignored.
     pub fn in_file_name(path: &Path) -> Option<Self> {
+        Self::found_in_name(path).map(|(date, _)| date)
+    }
+
+    /// The same, and what follows it in the name.
+    pub(super) fn found_in_name(path: &Path) -> Option<(Self, String)> {
         let name = path.file_name()?.to_string_lossy();
         let bytes = name.as_bytes();
         let mut found = (0..bytes.len()).filter_map(|at| Self::at(bytes, at));
-        let first = found.next()?;
-        found.all(|other| other.day == first.day).then_some(first)
+        let (first, end) = found.next()?;
+        let is_alone = found.all(|(other, _)| other.day == first.day);
+        let rest = String::from_utf8_lossy(&bytes[end..]).into_owned();
+        is_alone.then_some((first, rest))
     }
 
-    /// The date that begins at byte `start`.
-    fn at(bytes: &[u8], start: usize) -> Option<Self> {
+    /// The date that begins at byte `start`, and where it ends.
+    fn at(bytes: &[u8], start: usize) -> Option<(Self, usize)> {
         if start > 0 && bytes[start - 1].is_ascii_digit() {
             return None;
         }
@@ -83,10 +90,12 @@ impl ObservationDate {
             return None;
         }
         let day = Date::new(year, month as i8, text.number(2)? as i8).ok()?;
-        let time = text.clone().time();
+        let mut after = text.clone();
+        let time = after.time();
+        let end = if time.is_some() { after.at } else { text.at };
         // Digits after the day are a time, or the day is part of a longer number.
         let alone = !text.number_follows() || (separator.is_none() && time.is_some());
-        (YEARS.contains(&year) && alone).then_some(Self { day, time })
+        (YEARS.contains(&year) && alone).then_some((Self { day, time }, end))
     }
 
     /// The date of a day, and of the time since its midnight if that is known; `None` outside
@@ -112,6 +121,37 @@ impl ObservationDate {
             day: utc.date(),
             time: Some(utc.time()),
         })
+    }
+
+    /// The same day and time so many years later; `None` outside [`YEARS`], and on the 29th of February of a
+    /// year without one.
+    pub(crate) fn in_other_year(self, later: i16) -> Option<Self> {
+        let year = self.day.year().checked_add(later)?;
+        let day = Date::new(year, self.day.month(), self.day.day()).ok()?;
+        YEARS.contains(&year).then_some(Self { day, ..self })
+    }
+
+    /// The other dates that have the same numbers for the year in its century, the month and the day, in any
+    /// order.
+    pub(crate) fn reordered(self) -> Vec<Self> {
+        let century = self.day.year() / 100 * 100;
+        let [y, m, d] = [
+            self.day.year() % 100,
+            i16::from(self.day.month()),
+            i16::from(self.day.day()),
+        ];
+        let orders = [[y, d, m], [d, m, y], [m, d, y], [m, y, d], [d, y, m]];
+        let mut others: Vec<Self> = Vec::new();
+        for [year, month, day] in orders {
+            let Ok(day) = Date::new(century + year, month as i8, day as i8) else {
+                continue;
+            };
+            let other = Self { day, ..self };
+            if YEARS.contains(&day.year()) && other != self && !others.contains(&other) {
+                others.push(other);
+            }
+        }
+        others
     }
 
     /// The day in UTC.
@@ -250,7 +290,7 @@ impl Cursor<'_> {
     }
 
     /// Reads hour, minute and second, with the usual separators before and between them.
-    fn time(mut self) -> Option<Time> {
+    fn time(&mut self) -> Option<Time> {
         self.any_of(b"T_- t");
         let hour = self.number(2)?;
         let separator = self.any_of(b":-_.");

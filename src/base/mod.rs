@@ -1,6 +1,7 @@
 //! What numbers mean: units, angles, directions, dates, statistics, and how numbers are written.
 
 pub mod angle;
+pub mod clock;
 pub mod coords;
 pub(crate) mod differences;
 pub mod epoch;

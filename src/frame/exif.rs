@@ -4,7 +4,7 @@
 //! `FocalPlaneXResolution`, the GPS position and `Orientation`. TIFF's own `DateTime` is ignored: it is the time
 //! at which the file was last changed.
 //!
-//! Caveat: without `OffsetTimeOriginal` the time zone is unknown, and only the day is used.
+//! Caveat: without `OffsetTimeOriginal` or `OffsetTime` the time is that of a local clock.
 
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE};
 use super::orientation::Orientation;
@@ -25,6 +25,8 @@ pub(super) fn metadata(bytes: &[u8], width: usize) -> FrameMetadata {
     if let Some(day) = attributes.text(Tag::DateTimeOriginal) {
         let date = attributes.date(&day);
         metadata.date = metadata.plausible_date("DateTimeOriginal", &day, date);
+        let is_local = metadata.date.is_some_and(|date| !date.has_time());
+        metadata.local_date = is_local.then(|| attributes.local_date(&day)).flatten();
     }
     metadata
 }
@@ -142,16 +144,31 @@ impl Attributes {
         )
     }
 
-    /// Parses a date as Exif writes it, `2019:07:29 20:47:26`.
-    fn date(&self, day: &str) -> Option<ObservationDate> {
-        let (day, time) = day.split_once(' ').unwrap_or((day, ""));
+    /// Parses a date as Exif writes it, `2019:07:29 20:47:26`: in UTC where the offset of the clock is
+    /// stated, else the day.
+    fn date(&self, text: &str) -> Option<ObservationDate> {
+        let offset = self
+            .text(Tag::OffsetTimeOriginal)
+            .or_else(|| self.text(Tag::OffsetTime));
+        let in_utc = offset.and_then(|offset| self.iso(text, &offset).parse().ok());
+        let (day, _) = text.split_once(' ').unwrap_or((text, ""));
+        in_utc.or_else(|| day.replace(':', "-").parse().ok())
+    }
+
+    /// The same as the clock showed it, with its time.
+    fn local_date(&self, text: &str) -> Option<ObservationDate> {
+        let shown = self.iso(text, "").parse().ok();
+        shown.filter(ObservationDate::has_time)
+    }
+
+    /// The date in ISO 8601, with its fraction of a second, and this after it.
+    fn iso(&self, text: &str, offset: &str) -> String {
+        let (day, time) = text.split_once(' ').unwrap_or((text, ""));
         let day = day.replace(':', "-");
         let fraction = self
             .text(Tag::SubSecTimeOriginal)
             .map_or(String::new(), |digits| format!(".{digits}"));
-        self.text(Tag::OffsetTimeOriginal)
-            .and_then(|offset| format!("{day}T{time}{fraction}{offset}").parse().ok())
-            .or_else(|| day.parse().ok())
+        format!("{day}T{time}{fraction}{offset}")
     }
 }
 
@@ -283,9 +300,25 @@ mod tests {
     }
 
     #[test]
-    fn without_a_time_zone_only_the_day_is_known() {
+    fn without_a_time_zone_the_time_is_local() {
         let bytes = written(&[field(Tag::DateTimeOriginal, ascii("2019:07:29 22:47:26"))]);
-        assert_eq!(metadata(&bytes, 10).date.unwrap().to_iso(), "2019-07-29");
+        let found = metadata(&bytes, 10);
+        assert_eq!(found.date.unwrap().to_iso(), "2019-07-29");
+        assert_eq!(found.local_date.unwrap().to_iso(), "2019-07-29T22:47:26Z");
+        let stated = metadata(
+            &written(&[
+                field(Tag::DateTimeOriginal, ascii("2019:07:29 22:47:26")),
+                field(Tag::OffsetTime, ascii("+02:00")),
+            ]),
+            10,
+        );
+        assert_eq!(stated.date.unwrap().to_iso(), "2019-07-29T20:47:26Z");
+        assert_eq!(stated.local_date, None);
+        let day = metadata(
+            &written(&[field(Tag::DateTimeOriginal, ascii("2019:07:29"))]),
+            10,
+        );
+        assert_eq!(day.local_date, None);
     }
 
     #[test]

@@ -18,6 +18,9 @@ pub struct FrameMetadata {
     pub orientation: Orientation,
     /// Date of the exposure.
     pub date: Option<ObservationDate>,
+    /// Date and time that the camera's clock showed, where nothing says what it is ahead of UTC; then
+    /// [`date`](Self::date) is the day alone.
+    pub local_date: Option<ObservationDate>,
     /// Exposure time, in seconds.
     pub exposure_s: Option<f64>,
     /// Pixel pitch of the stored pixels, binning included, in micrometres.

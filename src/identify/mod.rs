@@ -46,7 +46,9 @@ pub use index::IndexedCatalog;
 pub use index::{CacheError, cache_directory};
 #[doc(hidden)]
 pub use predict::{PredictedStar, SkyView};
-pub use priors::{DateSource, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion};
+pub use priors::{
+    DateSource, DateZone, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
+};
 #[doc(hidden)]
 pub use search::LOG10_FALSE_ALARM_LIMIT;
 #[doc(hidden)]

@@ -1,5 +1,6 @@
 //! Priors: what is known of a frame before its stars are identified.
 
+use crate::base::clock::ClockDate;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::RAD_PER_DEG;
@@ -7,6 +8,8 @@ use crate::camera::data_sheet::DataSheet;
 use crate::camera::{self, Distortion, KnownLens, Projection};
 use crate::sky::observer::Site;
 use crate::sky::places::StarPlaces;
+use crate::sky::solar_system::TimeError;
+use jiff::SignedDuration;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -95,6 +98,64 @@ pub struct FrameDate {
     pub date: ObservationDate,
     /// Its source.
     pub source: DateSource,
+    /// How it is known to be UTC.
+    pub zone: DateZone,
+}
+
+impl FrameDate {
+    /// A date that its source states in UTC, or with what it is ahead of UTC.
+    pub const fn stated(date: ObservationDate, source: DateSource) -> Self {
+        Self {
+            date,
+            source,
+            zone: DateZone::Stated,
+        }
+    }
+
+    /// A clock's date; where nothing says what the clock is ahead of UTC, it is `local_ahead`, or else the date
+    /// is taken for UTC. `None` outside the years that are accepted.
+    pub fn of_clock(
+        clock: ClockDate,
+        source: DateSource,
+        local_ahead: Option<SignedDuration>,
+    ) -> Option<Self> {
+        let (date, zone) = match (clock.ahead, local_ahead) {
+            (Some(ahead), _) => (clock.minus(ahead)?, DateZone::Stated),
+            (None, Some(ahead)) => (clock.minus(ahead)?, DateZone::Given(ahead)),
+            (None, None) => (clock.shown, DateZone::Unknown),
+        };
+        Some(Self { date, source, zone })
+    }
+
+    /// How far the time may be from the true one.
+    pub fn time_error(&self) -> TimeError {
+        match (self.date.has_time(), self.is_utc()) {
+            (false, _) => TimeError::Day,
+            (true, false) => TimeError::Zone,
+            (true, true) => TimeError::None,
+        }
+    }
+
+    /// Whether the time may be used to tell which stars are above a site.
+    pub fn is_utc(&self) -> bool {
+        !matches!(self.zone, DateZone::Unknown | DateZone::Contradicted)
+    }
+}
+
+/// How a frame's time is known to be UTC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DateZone {
+    /// Its source states it in UTC, or with what it is ahead of UTC.
+    Stated,
+    /// It is that of a local clock, which the user says to be so much ahead of UTC.
+    Given(SignedDuration),
+    /// It is that of a local clock, which the stars over the site show to be so much ahead of UTC.
+    ByStars(SignedDuration),
+    /// It is that of a local clock, and was taken for UTC.
+    Unknown,
+    /// The stars contradict it, or the site.
+    Contradicted,
 }
 
 /// Source of a frame's date.
@@ -212,23 +273,22 @@ fn scales_of_field(fov_rad: f64, width_px: f64) -> [f64; 2] {
 
 impl Priors {
     /// Adds a date, unless one is known.
-    pub fn or_date(self, date: Option<ObservationDate>, source: DateSource) -> Self {
-        let other = date.map(|date| FrameDate { date, source });
+    pub fn or_date(self, date: Option<FrameDate>) -> Self {
         Self {
-            date: self.date.or(other),
+            date: self.date.or(date),
             ..self
         }
     }
 
     /// Where the catalogue's stars appear: at J2000.0, without aberration, where the date is not known.
     ///
-    /// Refraction needs a time that can be trusted: names of files have local times.
+    /// Refraction needs a time that can be trusted: not that of a local clock.
     pub fn places(&self) -> StarPlaces {
-        let Some(FrameDate { date, source }) = &self.date else {
+        let Some(known) = &self.date else {
             return StarPlaces::default();
         };
-        let site = self.site.filter(|_| *source != DateSource::FileName);
-        StarPlaces::at(date, site, self.velocity_km_s)
+        let site = self.site.filter(|_| known.is_utc());
+        StarPlaces::at(&known.date, site, self.velocity_km_s)
     }
 
     /// Smallest and largest pixel scale at the centre of a frame of this width, in radians, if

@@ -3,11 +3,12 @@
 use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::statistics::median;
 use crate::camera::KnownLens;
-use crate::identify::Identification;
+use crate::identify::{DateZone, Identification};
 use crate::lens::{LensFrame, calibrate};
 use crate::photometry::sky_map::{ClearSky, DarkLevel};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
 use crate::sky::observer::Site;
+use jiff::SignedDuration;
 use std::sync::Arc;
 
 /// Frames that tell the lens at least, where so many are identified.
@@ -28,6 +29,10 @@ pub struct Probe {
     clear_sky: Option<ClearSky>,
     has_dark_level: bool,
     site: Option<Site>,
+    /// What its local time is ahead of UTC, by the stars.
+    ahead: Option<SignedDuration>,
+    /// What the stars contradict of place and time.
+    site_or_time: Option<String>,
 }
 
 impl Probe {
@@ -47,6 +52,11 @@ impl Probe {
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
             has_dark_level: solution.sky.as_ref().is_none_or(|sky| sky.dark.is_some()),
             site: solution.site,
+            ahead: match solution.date.map(|known| known.zone) {
+                Some(DateZone::ByStars(ahead)) => Some(ahead),
+                _ => None,
+            },
+            site_or_time: solution.place_time.as_ref().map(ToString::to_string),
         })
     }
 }
@@ -72,6 +82,10 @@ pub struct NightStart {
     pub lacks_dark_level: bool,
     /// Where it is.
     pub site: Option<Site>,
+    /// What local times are ahead of UTC, as the stars of all frames that tell it agree.
+    pub ahead: Option<SignedDuration>,
+    /// What the stars of most frames contradict of place and time.
+    pub site_or_time: Option<String>,
 }
 
 impl NightStart {
@@ -88,6 +102,11 @@ impl NightStart {
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let lacks_dark_level = probes.iter().any(|probe| !probe.has_dark_level);
         let site = probes.iter().find_map(|probe| probe.site);
+        let ahead = agreed(probes.iter().filter_map(|probe| probe.ahead));
+        let wrong = probes.iter().filter_map(|probe| probe.site_or_time.clone());
+        let wrong: Vec<String> = wrong.collect();
+        let are_most = 2 * wrong.len() > probes.len();
+        let site_or_time = wrong.into_iter().next().filter(|_| are_most);
         let lens = known.or_else(|| measured_lens(probes));
         let held = first
             .zip(lens.as_ref())
@@ -105,6 +124,8 @@ impl NightStart {
             held,
             clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
             site,
+            ahead,
+            site_or_time,
         }
     }
 
@@ -121,6 +142,12 @@ impl NightStart {
     pub fn is_enough(identified: usize, tried: usize) -> bool {
         identified >= WANTED || tried >= MAX_TRIED
     }
+}
+
+/// The value that all have, if there is one.
+fn agreed<T: PartialEq>(mut values: impl Iterator<Item = T>) -> Option<T> {
+    let first = values.next()?;
+    values.all(|value| value == first).then_some(first)
 }
 
 /// The lens that the frames show together, else that of the one with the most stars.

@@ -37,6 +37,7 @@ pub struct NightSummary {
     pub knocks: Vec<Knock>,
     pub moments: Vec<Moment>,
     pub hot_pixels: Option<usize>,
+    pub site_or_time: Option<String>,
     pub map: Vec<MapCell>,
 }
 
@@ -111,6 +112,7 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
         moments: Series::new(rows).moments(site, knocks),
         knocks: knocks.to_vec(),
         hot_pixels: None,
+        site_or_time: None,
         map: map(rows),
     }
 }

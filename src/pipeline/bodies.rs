@@ -4,10 +4,10 @@ use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;
 use super::solution::Source;
 use crate::base::statistics::median;
-use crate::identify::{DateSource, Identification, Priors, SourceIndex};
+use crate::identify::{Identification, Priors, SourceIndex};
 use crate::photometry::instrumental_mag;
 use crate::sky::catalog::Catalog;
-use crate::sky::solar_system::{Body, BodyKind, TimeError, bodies_within};
+use crate::sky::solar_system::{Body, BodyKind, bodies_within};
 use std::collections::HashMap;
 
 /// The largest radius of a body's disc: part of it may be in a frame whose corner it is beyond.
@@ -24,16 +24,17 @@ pub(super) fn find_bodies(
     let (Outcome::Identified(found), Some(known)) = (outcome, priors.date) else {
         return Vec::new();
     };
-    let time_error = match known.source {
-        DateSource::User | DateSource::FileHeader => TimeError::None,
-        // Phones and cameras write local time.
-        DateSource::FileName => TimeError::Zone,
-    };
     let (centre, _) = found.icrs_to_camera.boresight_and_up();
     let radius_rad = found.camera.radius_rad() + MOON_RADIUS_RAD;
-    let expected = bodies_within(&known.date, time_error, priors.site, &centre, radius_rad)
-        .into_iter()
-        .filter_map(|body| BodyInFrame::expected(body, found));
+    let expected = bodies_within(
+        &known.date,
+        known.time_error(),
+        priors.site,
+        &centre,
+        radius_rad,
+    )
+    .into_iter()
+    .filter_map(|body| BodyInFrame::expected(body, found));
     let expected: Vec<BodyInFrame> = expected.collect();
     if expected.is_empty() {
         return expected;
@@ -140,7 +141,7 @@ impl<'a> Field<'a> {
 }
 
 /// Instrumental magnitude of a source whose flux is known.
-fn mag(source: &Source) -> Option<f64> {
+pub(super) fn mag(source: &Source) -> Option<f64> {
     source.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
 }
 
@@ -150,7 +151,7 @@ mod tests {
     use crate::base::coords::{PixelPoint, Rotation, UnitVector};
     use crate::base::epoch::ObservationDate;
     use crate::camera::CameraModel;
-    use crate::identify::{FrameDate, StarMatch};
+    use crate::identify::{DateSource, FrameDate, StarMatch};
     use crate::sky::catalog::StarIndex;
     use crate::sky::places::StarPlaces;
     use crate::sky::solar_system::bodies_at;
@@ -201,10 +202,7 @@ mod tests {
             flux: Some(10f64.powf(-0.4 * (v_mag - 15.0))),
         };
         let priors = Priors {
-            date: Some(FrameDate {
-                date,
-                source: DateSource::User,
-            }),
+            date: Some(FrameDate::stated(date, DateSource::User)),
             site: Some(site),
             ..Priors::default()
         };
@@ -275,10 +273,7 @@ mod tests {
         let (mut outcome, sources, mut priors) =
             frame("2019-07-16T12:00:00Z", BodyKind::Moon, &sources);
         let date = "2019-07-16".parse().unwrap();
-        priors.date = Some(FrameDate {
-            date,
-            source: DateSource::FileHeader,
-        });
+        priors.date = Some(FrameDate::stated(date, DateSource::FileHeader));
         let bodies = find_bodies(&mut outcome, &sources, &priors, Catalog::built_in());
         // The brightest is still the Moon: nothing else is as bright.
         assert_eq!(bodies[0].source, Some(SourceIndex::new(0)));

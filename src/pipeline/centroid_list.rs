@@ -5,6 +5,7 @@ use super::context::{Context, Workspace};
 use super::identification::{identified, observation, search, through_air_or_not};
 use super::left_out::{LeftOut, RowProblem};
 use super::note::Note;
+use super::place_time::{Settled, settle};
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
@@ -209,13 +210,6 @@ pub fn solve_centroids(
         ..context.priors
     };
     let (list, left_out) = list.usable();
-    let (mut outcome, _) = through_air_or_not(priors.places(), |places| {
-        let field = list.star_field(places);
-        let workspace = &mut workspace.identify;
-        let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
-        identified(found, None, &field, priors, context.indexed)
-    });
-    let observation = observation(&outcome, priors);
     let source = |centroid: &ListedCentroid| Source {
         position: centroid.position,
         measured: None,
@@ -223,9 +217,28 @@ pub fn solve_centroids(
     };
     let sources: Vec<Source> = list.centroids.iter().map(source).collect();
     let catalog = context.indexed.catalog();
+    let mut identify = |places| {
+        let field = list.star_field(places);
+        let workspace = &mut workspace.identify;
+        let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
+        identified(found, None, &field, priors, context.indexed)
+    };
+    let answer = through_air_or_not(priors.places(), &mut identify);
+    let known = (priors, context.utc_offset);
+    let Settled {
+        mut outcome,
+        priors,
+        place_time,
+        ..
+    } = settle(answer, known, (&sources, catalog), |places| {
+        through_air_or_not(places, &mut identify)
+    });
+    let priors = &priors;
+    let observation = observation(&outcome, priors);
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
     clock.lap(Stage::Identify);
     let note = Note::of_observation(observation.as_ref(), priors, &outcome);
+    let note = Note::of_place_time(place_time.as_ref()).chain(note);
     let notes = left_out.into_iter().map(Note::RowsLeftOut);
     let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
     let notes = notes.chain(unknown).chain(note);
@@ -241,6 +254,7 @@ pub fn solve_centroids(
         date: priors.date,
         notes: notes.collect(),
         observation,
+        place_time,
         site: priors.site,
         exposure_s: priors.exposure_s,
         spot_sigma_px: None,

@@ -2,16 +2,17 @@
 
 use super::held::HeldCamera;
 use super::stopwatch::Stage;
-use crate::base::epoch::ObservationDate;
+use crate::base::clock::{ClockDate, UtcOffset};
 use crate::base::interrupt::Interrupt;
 use crate::calibration::Calibration;
 use crate::camera::KnownLens;
 use crate::detect::{self, DetectConfig};
 use crate::frame::{self, Frame};
-use crate::identify::{self, DateSource, Effort, IndexedCatalog, NAME_ODDS, Priors, ScalePrior};
+use crate::identify::{
+    self, DateSource, Effort, FrameDate, IndexedCatalog, NAME_ODDS, Priors, ScalePrior,
+};
 use crate::photometry::comparison::ObservingSetup;
 use crate::sky::places::AttitudeFrame;
-use jiff::SignedDuration;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,9 +35,8 @@ pub struct Context<'a> {
     pub camera: Option<ObservingSetup>,
     /// The lens with which they were taken, where it was measured.
     pub lens: Option<Arc<KnownLens>>,
-    /// What the dates in the names of files are ahead of UTC, where it is known.
-    #[doc(hidden)]
-    pub names_ahead_of_utc: Option<SignedDuration>,
+    /// What local times in names of files and in Exif are ahead of UTC, where it is known.
+    pub utc_offset: Option<UtcOffset>,
     /// How the camera stands, where it does not move: tried first.
     #[doc(hidden)]
     pub held: Option<Arc<HeldCamera>>,
@@ -78,7 +78,7 @@ impl<'a> Context<'a> {
             priors: Priors::default(),
             camera: None,
             lens: None,
-            names_ahead_of_utc: None,
+            utc_offset: None,
             held: None,
             calibration: None,
             attitude_only: false,
@@ -101,18 +101,22 @@ impl<'a> Context<'a> {
         let lens = self.lens_of(frame.width, frame.height);
         let camera_scale = self.camera.as_ref().map(|camera| &camera.sheet);
         let header_scale = header.pixel_scale_rad().map(ScalePrior::of_header);
-        let in_name = name.and_then(ObservationDate::in_file_name);
-        let (in_name, by_name) = match self.names_ahead_of_utc {
-            Some(ahead) => (
-                in_name.and_then(|date| date.earlier_by(ahead)),
-                DateSource::User,
-            ),
-            None => (in_name, DateSource::FileName),
+        let in_name = name.and_then(ClockDate::in_file_name);
+        let local_ahead = match self.utc_offset {
+            Some(UtcOffset::Ahead(ahead)) => Some(ahead),
+            Some(UtcOffset::Auto) | None => None,
         };
+        let dated = |clock, source| FrameDate::of_clock(clock, source, local_ahead);
+        let on_clock = header.local_date.map(ClockDate::local);
         let priors = self
             .priors
-            .or_date(header.date, DateSource::FileHeader)
-            .or_date(in_name, by_name);
+            .or_date(on_clock.and_then(|clock| dated(clock, DateSource::FileHeader)))
+            .or_date(
+                header
+                    .date
+                    .map(|date| FrameDate::stated(date, DateSource::FileHeader)),
+            )
+            .or_date(in_name.and_then(|clock| dated(clock, DateSource::FileName)));
         Priors {
             holds_lens: lens.is_some(),
             scale: priors

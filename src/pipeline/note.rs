@@ -4,6 +4,7 @@ use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
 use super::left_out::LeftOut;
 use super::outcome::Outcome;
+use super::place_time::PlaceTime;
 use super::raw_color::RawColor;
 use crate::base::format::counted;
 use crate::base::statistics::Estimate;
@@ -15,7 +16,7 @@ use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
 use crate::identify::diagnosis::DoubleImage;
-use crate::identify::{Identification, Priors, ScalePrior, ScaleSource};
+use crate::identify::{DateZone, Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, ObservingSetup};
 use crate::sky::catalog::Catalog;
@@ -67,6 +68,10 @@ pub enum Note {
         /// How far below, in radians.
         depth_rad: f64,
     },
+    /// The stars contradict the site or the time.
+    SiteOrTime(PlaceTime),
+    /// The time is that of a local clock, and was taken for UTC.
+    ZoneAssumed,
     /// The frame was not taken with the lens that was measured, or that has changed.
     OtherLens {
         /// Focal length of that lens in the frame's centre, in pixels.
@@ -147,6 +152,8 @@ impl Note {
             Self::RoundPicture(_) => "round_picture",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
+            Self::SiteOrTime(_) => "site_or_time_wrong",
+            Self::ZoneAssumed => "time_zone_assumed",
             Self::OtherLens { .. } => "lens_differs",
             Self::LensOfOtherSize { .. } => "lens_of_other_size",
             Self::NoDate => "date_unknown",
@@ -183,6 +190,10 @@ impl Note {
             }
             Self::NoTimeOfDay => {
                 "the time of day is not known, and so the site gives no zenith distance and no refraction"
+            }
+            Self::ZoneAssumed => {
+                "nothing says what the clock of the file's time was ahead of UTC: the time was taken for UTC, and \
+                 the place in the sky of the site is true only if it is (utc_offset)"
             }
             Self::AttitudeOnly => {
                 "attitude and optics are from the brightest stars; no other star was looked up, and no \
@@ -271,6 +282,27 @@ impl Note {
             let lacks_time = priors.site.is_some() && outcome.identification().is_some();
             return lacks_time.then_some(Self::NoTimeOfDay);
         };
+        Self::of_depth(observation)
+    }
+
+    /// A site or a time that the stars contradict, and where the frame's centre would be with them.
+    pub(super) fn of_place_time(wrong: Option<&PlaceTime>) -> impl Iterator<Item = Self> {
+        let stated = wrong.and_then(|wrong| wrong.stated.as_ref());
+        let below = stated.and_then(Self::of_depth);
+        below
+            .into_iter()
+            .chain(wrong.cloned().map(Self::SiteOrTime))
+    }
+
+    /// A local time that was taken for UTC, where that matters.
+    pub(super) fn of_zone(priors: &Priors, outcome: &Outcome) -> Option<Self> {
+        let known = priors.date.filter(|known| known.date.has_time())?;
+        let is_assumed = known.zone == DateZone::Unknown && priors.site.is_some();
+        (is_assumed && outcome.identification().is_some()).then_some(Self::ZoneAssumed)
+    }
+
+    /// A centre below the horizon.
+    fn of_depth(observation: &Observation) -> Option<Self> {
         let depth_rad = observation.zenith_distance_rad - std::f64::consts::FRAC_PI_2;
         let is_below = observation.apparent.is_none();
         is_below.then_some(Self::BelowHorizon { depth_rad })
@@ -357,6 +389,7 @@ impl fmt::Display for Note {
             Self::BrightnessUnknown
             | Self::NoDate
             | Self::NoTimeOfDay
+            | Self::ZoneAssumed
             | Self::NoExposure
             | Self::AttitudeOnly
             | Self::SkyNotMeasured => f.write_str(self.fixed_text().unwrap_or_default()),
@@ -388,6 +421,7 @@ impl fmt::Display for Note {
                 "the site, the date and the attitude contradict each other: the frame's centre stands {:.1}° below the horizon",
                 depth_rad * DEG_PER_RAD
             ),
+            Self::SiteOrTime(wrong) => wrong.fmt(f),
             Self::MoreStars { wanted } => write!(
                 f,
                 "the brightest {wanted} detections, as many as were to be measured, did not identify the \

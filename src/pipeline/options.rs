@@ -1,6 +1,7 @@
 //! What is stated for all frames, as people state it: hints, limits, and what to measure.
 
 use super::context::{Context, DEFAULT_TIME_LIMIT_S};
+use crate::base::clock::UtcOffset;
 use crate::base::coords::UnitVector;
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
@@ -48,6 +49,8 @@ pub struct SolveOptions {
     /// When the frames were taken.
     #[serde(serialize_with = "iso")]
     pub date: Option<ObservationDate>,
+    /// What local times in names of files and in Exif are ahead of UTC.
+    pub utc_offset: Option<UtcOffset>,
     /// Where they were taken.
     #[serde(serialize_with = "geodetic")]
     pub site: Option<Site>,
@@ -108,10 +111,9 @@ impl SolveOptions {
                     radius_rad: self.radius_deg * RAD_PER_DEG,
                 }
             }),
-            date: self.date.map(|date| FrameDate {
-                date,
-                source: DateSource::User,
-            }),
+            date: self
+                .date
+                .map(|date| FrameDate::stated(date, DateSource::User)),
             site: self.site,
             velocity_km_s: self.velocity_km_s.map(Into::into),
             holds_lens: false,
@@ -151,6 +153,7 @@ impl Default for SolveOptions {
             near_deg: None,
             radius_deg: Self::DEFAULT_RADIUS_DEG,
             date: None,
+            utc_offset: None,
             site: None,
             velocity_km_s: None,
             attitude_frame: AttitudeFrame::default(),
@@ -203,6 +206,7 @@ impl<'a> Context<'a> {
         Self {
             detect: options.detect_config(),
             priors: options.priors(),
+            utc_offset: options.utc_offset,
             camera: sheet.map(|sheet| options.observing_setup(sheet)),
             lens: lens.filter(|_| !options.refine_lens),
             name_odds: options.name_odds,

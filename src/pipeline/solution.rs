@@ -3,6 +3,7 @@
 use super::body_in_frame::BodyInFrame;
 use super::note::Note;
 use super::outcome::Outcome;
+use super::place_time::PlaceTime;
 use super::stopwatch::Timing;
 use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
@@ -31,7 +32,9 @@ pub struct Solution {
     /// The frame's centre in the observer's sky, where the frame is identified, and site and time
     /// of day are known.
     pub observation: Option<Observation>,
-    /// Where the frame was taken, if known.
+    /// What the stars contradict of the place and the time that are stated.
+    pub place_time: Option<PlaceTime>,
+    /// Where the frame was taken, if known, and not contradicted.
     pub site: Option<Site>,
     /// Exposure time, in seconds, if known.
     pub exposure_s: Option<f64>,

@@ -6,6 +6,7 @@ use super::error::Error;
 use super::identification::{double_image, identify_stars, observation, through_air_or_not};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
+use super::place_time::{PlaceTime, Settled, settle};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::{Solution, Source};
@@ -226,6 +227,8 @@ fn solve(
         mut outcome,
         dropped_scale,
         places,
+        priors,
+        place_time,
     } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
@@ -243,6 +246,7 @@ fn solve(
         mosaic,
         observation: observation(&outcome, &priors),
         priors,
+        place_time,
         places,
         trails: stage.trails(&detections, &mut clock),
         detections,
@@ -308,6 +312,10 @@ struct FoundStars {
     dropped_scale: Option<ScalePrior>,
     /// Where the catalogue's stars appear.
     places: StarPlaces,
+    /// What is known of the frame, as far as the stars do not contradict it.
+    priors: Priors,
+    /// What they contradict.
+    place_time: Option<PlaceTime>,
 }
 
 impl StarSearch<'_, '_> {
@@ -352,7 +360,7 @@ impl StarSearch<'_, '_> {
         let frame = self.prepared.frame();
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
-        let (outcome, places) = through_air_or_not(priors.places(), |places| {
+        let mut identify = |places| {
             let held = context.held.as_ref();
             let near = held.and_then(|held| held.near(priors, &places));
             let mut outcome = None;
@@ -370,6 +378,18 @@ impl StarSearch<'_, '_> {
             outcome.unwrap_or(Outcome::NotIdentified(Reason::Search(
                 SearchFailure::Interrupted,
             )))
+        };
+        let answer = through_air_or_not(priors.places(), &mut identify);
+        let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
+        let known = (priors, context.utc_offset);
+        let sky = (&sources[..], context.indexed.catalog());
+        let Settled {
+            outcome,
+            places,
+            priors,
+            place_time,
+        } = settle(answer, known, sky, |places| {
+            through_air_or_not(places, &mut identify)
         });
         if outcome.identification().is_none()
             && let Some(spot_sigma_px) = context.held.as_ref().and_then(|held| held.spot_sigma_px)
@@ -389,6 +409,8 @@ impl StarSearch<'_, '_> {
             outcome,
             dropped_scale,
             places,
+            priors,
+            place_time,
         }))
     }
 }
@@ -419,6 +441,7 @@ fn not_in_time(
         row_order: Some(frame.metadata.row_order),
         date: priors.date,
         observation: None,
+        place_time: None,
         site: priors.site,
         exposure_s: priors.exposure_s,
         spot_sigma_px: None,

@@ -5,6 +5,7 @@ use super::bright_stars::NamedFrame;
 use super::context::Context;
 use super::note::Note;
 use super::outcome::Outcome;
+use super::place_time::PlaceTime;
 use super::raw_color::RawColor;
 use super::solution::{Background, Solution, Source};
 use super::stopwatch::Timing;
@@ -53,6 +54,8 @@ pub(super) struct SolvedFrame<'a> {
     /// The sky at each place.
     pub sky: Option<SkyMap>,
     pub observation: Option<Observation>,
+    /// What the stars contradict of place and time.
+    pub place_time: Option<PlaceTime>,
 }
 
 impl SolvedFrame<'_> {
@@ -228,6 +231,7 @@ impl SolvedFrame<'_> {
                     .map_or(1.0, SkyArea::share),
             }),
             observation: self.observation,
+            place_time: self.place_time,
             site: self.priors.site,
             attitude_only: self.context.attitude_only,
             attitude_frame: self.context.attitude_frame,
@@ -259,7 +263,9 @@ impl SolvedFrame<'_> {
             .chain(self.more_stars.map(|wanted| Note::MoreStars { wanted }))
             .chain(Note::of_lens(self.context.lens.as_deref(), outcome))
             .chain(Note::of_circle(self.detections.sky_area.as_ref(), outcome))
+            .chain(Note::of_place_time(self.place_time.as_ref()))
             .chain(Note::of_observation(observation, priors, outcome))
+            .chain(Note::of_zone(priors, outcome))
             .chain(Note::of_camera(camera, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
             .chain(self.detections.noise_tail.map(Note::FalseDetections))

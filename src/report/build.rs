@@ -6,13 +6,14 @@ use super::digits::{
 };
 use super::frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport,
-    CompletenessReport, DateReport, DistortionReport, FrameReport, MagnitudeReport, MatchReport,
-    NoteReport, ObservationReport, OpticsReport, PhotometryReport, SCHEMA, SiteReport, Status,
-    TimingReport,
+    CandidateReport, CompletenessReport, DateReport, DistortionReport, FrameReport,
+    MagnitudeReport, MatchReport, NoteReport, ObservationReport, OpticsReport, PhotometryReport,
+    PlaceTimeReport, SCHEMA, SiteReport, Status, TimingReport,
 };
 use super::sky::SkyReport;
 use super::stars::{self, ReportedPointing};
 use super::{bodies, reason, trails};
+use crate::base::clock::hours_of;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
     finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
@@ -20,10 +21,12 @@ use crate::base::format::{
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
 use crate::camera::CameraModel;
-use crate::identify::{FrameDate, Identification, StarMatch};
+use crate::identify::{DateZone, FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::MagnitudeBin;
-use crate::pipeline::{Background, Note, Outcome, Solution, Timing};
+use crate::pipeline::{
+    Background, Contradiction, Note, Outcome, PlaceTime, Proposal, Solution, Timing,
+};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::Observation;
 use crate::sky::places::AttitudeFrame;
@@ -60,6 +63,7 @@ impl FrameReport {
             row_order: solution.row_order,
             date: solution.date.as_ref().map(date),
             observation: solution.observation.as_ref().map(observation),
+            place_time: solution.place_time.as_ref().map(place_time),
             exposure_s: solution
                 .exposure_s
                 .and_then(|s| significant(s, FLUX_DIGITS)),
@@ -150,10 +154,65 @@ fn calibration(applied: &Applied) -> CalibrationReport {
 }
 
 fn date(known: &FrameDate) -> DateReport {
+    let has_time = known.date.has_time();
+    let (told_by, ahead) = match known.zone {
+        DateZone::Stated => ("stated", None),
+        DateZone::Given(ahead) => ("option", Some(ahead)),
+        DateZone::ByStars(ahead) => ("stars", Some(ahead)),
+        DateZone::Unknown => ("assumed", None),
+        DateZone::Contradicted => ("contradicted", None),
+    };
     DateReport {
         iso: known.date.to_iso(),
         year: to_decimals(known.date.julian_epoch(), YEAR_DECIMALS),
         source: known.source,
+        utc_offset_h: has_time.then(|| ahead.map_or(0.0, hours_of)),
+        utc_offset_source: has_time.then_some(told_by),
+        uncertainty_h: known.time_error().hours(),
+    }
+}
+
+fn place_time(wrong: &PlaceTime) -> PlaceTimeReport {
+    let deg = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 1);
+    let mut report = PlaceTimeReport {
+        contradicted_by: wrong
+            .contradictions
+            .iter()
+            .map(Contradiction::code)
+            .collect(),
+        stars_below_horizon: None,
+        lowest_star_deg: None,
+        sun_altitude_deg: None,
+        candidates: wrong.proposals.iter().map(candidate).collect(),
+    };
+    for contradiction in &wrong.contradictions {
+        match contradiction {
+            Contradiction::StarsBelowHorizon {
+                below, lowest_rad, ..
+            } => {
+                report.stars_below_horizon = Some(*below);
+                report.lowest_star_deg = Some(deg(*lowest_rad));
+            }
+            Contradiction::SunIsUp { altitude_rad } => {
+                report.sun_altitude_deg = Some(deg(*altitude_rad));
+            }
+            Contradiction::Refraction { .. } | Contradiction::Planets { .. } => {}
+        }
+    }
+    report
+}
+
+fn candidate(proposal: &Proposal) -> CandidateReport {
+    let range = proposal.range;
+    CandidateReport {
+        change: proposal.change.code(),
+        amount: proposal.change.amount(),
+        amount_from: range.map(|[from, _]| from),
+        amount_to: range.map(|[_, to]| to),
+        lat_deg: to_decimals(proposal.site.lat_deg(), DIRECTION_DECIMALS),
+        lon_deg: to_decimals(proposal.site.lon_deg(), DIRECTION_DECIMALS),
+        date: proposal.date.to_iso(),
+        odds_against: to_significant(proposal.odds_against, SIGMA_DIGITS),
     }
 }
 

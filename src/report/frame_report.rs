@@ -32,6 +32,8 @@ pub struct FrameReport {
     /// The frame's centre in the observer's sky, where the frame is identified, and site and time
     /// of day are known.
     pub observation: Option<ObservationReport>,
+    /// What the stars contradict of the site and the time; `None` where nothing.
+    pub place_time: Option<PlaceTimeReport>,
     /// Exposure in seconds, if known.
     pub exposure_s: Option<f64>,
     /// What is odd about the frame, its header, or the priors.
@@ -108,6 +110,51 @@ pub struct DateReport {
     pub year: f64,
     /// `option`, `file header` or `file name`.
     pub source: DateSource,
+    /// What the clock of the source was taken to be ahead of UTC, in hours: 0 where it states UTC, or its
+    /// offset; `None` where only the day is known.
+    pub utc_offset_h: Option<f64>,
+    /// What tells that: `stated` with the date, `option`, `stars`, `assumed`, or `contradicted` by the stars;
+    /// `None` where only the day is known.
+    pub utc_offset_source: Option<&'static str>,
+    /// The date may be off by so many hours, for what is known of the offset.
+    pub uncertainty_h: f64,
+}
+
+/// What the stars contradict of the place and the time that are stated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlaceTimeReport {
+    /// What contradicts them: `stars_below_horizon`, `refraction`, `sun_is_up`, `planets`.
+    pub contradicted_by: Vec<&'static str>,
+    /// Sure stars that would be below the horizon.
+    pub stars_below_horizon: Option<usize>,
+    /// True altitude of the lowest of them, in degrees.
+    pub lowest_star_deg: Option<f64>,
+    /// True altitude of the Sun, in degrees, where it contradicts them.
+    pub sun_altitude_deg: Option<f64>,
+    /// What would put them right, the most likely first.
+    pub candidates: Vec<CandidateReport>,
+}
+
+/// What would put a place and a time right.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CandidateReport {
+    /// What is changed: `latitude_sign`, `longitude_sign`, `both_signs`, `exchanged`, `place`, `hours`,
+    /// `order_of_date`, `days`, `years`.
+    pub change: &'static str,
+    /// By how much the time is later, in the unit of the change; `None` for other changes.
+    pub amount: Option<f64>,
+    /// The least of the amounts that are nearly as good.
+    pub amount_from: Option<f64>,
+    /// The largest of them.
+    pub amount_to: Option<f64>,
+    /// Latitude, north positive, in degrees.
+    pub lat_deg: f64,
+    /// Longitude, east positive, in degrees.
+    pub lon_deg: f64,
+    /// The date in UTC, ISO 8601.
+    pub date: String,
+    /// Odds of the first candidate against it.
+    pub odds_against: f64,
 }
 
 /// The frame's centre in the observer's sky.

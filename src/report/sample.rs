@@ -12,6 +12,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         date: None,
         sources: Vec::new(),
         observation: None,
+        place_time: None,
         site: None,
         photometry: None,
         sky: None,

@@ -44,6 +44,7 @@ fn unidentified() -> FrameReport {
         row_order: Some(RowOrder::TopDown),
         date: None,
         observation: None,
+        place_time: None,
         exposure_s: None,
         notes: Vec::new(),
         status: Status::NotIdentified,
@@ -159,6 +160,9 @@ fn identified() -> FrameReport {
             iso: "2019-07-29T20:47:26Z".into(),
             year: 2019.5739,
             source: DateSource::FileName,
+            utc_offset_h: Some(0.0),
+            utc_offset_source: Some("assumed"),
+            uncertainty_h: 14.0,
         }),
         observation: Some(ObservationReport {
             site: SiteReport {

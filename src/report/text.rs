@@ -1,7 +1,7 @@
 //! The report as text, at most [`LINE_WIDTH`] columns wide where names allow it.
 
 use super::frame_report::{
-    AttitudeReport, CalibrationReport, FrameReport, MagnitudeReport, MatchReport,
+    AttitudeReport, CalibrationReport, DateReport, FrameReport, MagnitudeReport, MatchReport,
     ObservationReport, OpticsReport, PhotometryReport, StarReport, Status,
 };
 use crate::base::format::{self, counted, decimals_for, printable};
@@ -104,7 +104,8 @@ impl FrameReport {
                     DateSource::FileName => "from the file's name",
                 };
                 let utc = date.iso.replace('T', " ").replace('Z', " UTC");
-                format!("{utc}, {source}: positions for that date")
+                let offset = offset_text(date);
+                format!("{utc}, {source}{offset}: positions for that date")
             }
             None => {
                 let see = names.see(&[Remedy::Date]);
@@ -174,6 +175,18 @@ impl FrameReport {
             ));
         }
         lines
+    }
+}
+
+/// What a local time was taken to be ahead of UTC.
+fn offset_text(date: &DateReport) -> String {
+    let hours = date.utc_offset_h.unwrap_or_default();
+    match date.utc_offset_source {
+        Some("option") => format!(", {hours} h ahead of UTC as given"),
+        Some("stars") => format!(", {hours} h ahead of UTC by the stars"),
+        Some("assumed") => ", taken for UTC".to_owned(),
+        Some("contradicted") => ", contradicted by the stars or the site is".to_owned(),
+        _ => String::new(),
     }
 }
 

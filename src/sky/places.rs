@@ -195,6 +195,13 @@ impl StarPlaces {
                 seen.as_vector() * inverse_gamma + velocity_c * (1.0 + along),
             );
         }
+        self.refracted(&seen)
+    }
+
+    /// Where something appears that would appear in this direction without air.
+    #[inline]
+    pub(crate) fn refracted(&self, airless: &UnitVector<Icrs>) -> UnitVector<Icrs> {
+        let mut seen = *airless;
         if let Some(Refraction { air, zenith, .. }) = &self.refraction {
             let cosine = seen.dot(zenith);
             let per_sine = air.refraction_per_sine(cosine);

@@ -37,6 +37,7 @@ mod orientation;
 mod output_files;
 mod pages;
 mod photometry;
+mod place_time;
 mod real_sky;
 mod robustness;
 mod schema;

@@ -73,10 +73,8 @@ fn solved(
     };
     let (frame, _) = simulator.frame(&pointing, 7).unwrap();
     let mut context = Context::new(sky);
-    context.priors.date = known.map(|date| FrameDate {
-        date: date.parse().unwrap(),
-        source: DateSource::User,
-    });
+    context.priors.date =
+        known.map(|date| FrameDate::stated(date.parse().unwrap(), DateSource::User));
     solve_frame(&frame, &context, &mut Workspace::new()).unwrap()
 }
 

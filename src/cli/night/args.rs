@@ -10,7 +10,6 @@ use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
 use crate::cli::solving::Plan;
 use clap::Args;
-use jiff::SignedDuration;
 use starpipe::calibration::Calibration;
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
@@ -36,10 +35,6 @@ pub(crate) struct NightArgs {
     /// Also write night.html: the figure, what changed, and the table, to look at in a browser
     #[arg(long)]
     pub(super) html: bool,
-    /// How many hours the dates in the files' names are ahead of UTC: 0 if they are UTC. Dates in headers
-    /// are UTC [default: not known, and such dates tell no place in the sky of a site]
-    #[arg(long, value_name = "HOURS", value_parser = values::finite, allow_hyphen_values = true)]
-    pub(super) utc_offset: Option<f64>,
     /// What to print when the night is done
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
     pub(super) format: PageFormat,
@@ -85,13 +80,6 @@ pub(super) struct StationOptions {
 }
 
 impl NightArgs {
-    /// What the dates in the names are ahead of UTC.
-    pub(super) fn names_ahead_of_utc(&self) -> Option<SignedDuration> {
-        const S_PER_HOUR: f64 = 3600.0;
-        self.utc_offset
-            .map(|hours| SignedDuration::from_secs((hours * S_PER_HOUR).round() as i64))
-    }
-
     /// The calibration with the hot pixels that were learned.
     pub(super) fn masked_calibration(&self) -> anyhow::Result<Option<Calibration>> {
         let learned = CalibrationOptions {

@@ -35,12 +35,10 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
         let names = order::by_date(names, pool, plan.memory);
         claim(arguments, &plan, &names, indexed.catalog())?;
         let (journal, rows) = Journal::open(&arguments.out.join(files::ROWS), &names, BATCH)?;
-        let mut context = plan.context(indexed);
-        context.names_ahead_of_utc = arguments.names_ahead_of_utc();
         let run = Run {
             pool,
             plan: &plan,
-            context,
+            context: plan.context(indexed),
             is_quiet: arguments.quiet,
         };
         let start = run.start(&names);
@@ -105,7 +103,6 @@ fn configuration(
     } = arguments;
     Ok(Configuration {
         night: Some(NightConfiguration {
-            utc_offset_h: arguments.utc_offset,
             mask_hot_pixels: arguments.mask_hot_pixels,
         }),
         ..calibration.configuration(catalog, &plan.options, hints)?
@@ -125,6 +122,7 @@ fn finish(
     } = measured;
     let mut night = summarize(rows, start.site, history.knocks());
     night.hot_pixels = hot_pixels;
+    night.site_or_time.clone_from(&start.site_or_time);
     let station = SkyglowStation {
         instrument: arguments.station.instrument.clone(),
         supplier: arguments.station.supplier.clone(),

@@ -35,7 +35,8 @@ fn seconds(date: Option<&ObservationDate>) -> Option<f64> {
 /// The dates in the files, or in the names where these have none.
 fn in_headers(names: &[String], pool: &rayon::ThreadPool, memory: MemoryLimit) -> Vec<Option<f64>> {
     of_each(names, pool, memory, |path, frame| {
-        let date = frame.metadata.date;
+        let header = &frame.metadata;
+        let date = header.local_date.or(header.date);
         seconds(
             date.or_else(|| ObservationDate::in_file_name(path))
                 .as_ref(),

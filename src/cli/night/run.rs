@@ -6,6 +6,7 @@ use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{Inputs, Plan, Sink, Solved, Solver};
 use indicatif::ProgressBar;
+use starpipe::UtcOffset;
 use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::night::{NightRow, NightStart, PointingHistory, Probe, probe_order};
@@ -116,6 +117,9 @@ impl<'a> Run<'a> {
     ) -> Vec<NightRow> {
         let mut context = self.context.clone();
         context.lens = measured.start.lens.clone();
+        if let (Some(UtcOffset::Auto), Some(ahead)) = (context.utc_offset, measured.start.ahead) {
+            context.utc_offset = Some(UtcOffset::Ahead(ahead));
+        }
         context.held = measured.held().map(Arc::new);
         let rows = Rows {
             clear_ground_vmag: measured.start.clear_ground_vmag,

@@ -45,6 +45,9 @@ pub(super) fn text(night: &NightSummary) -> String {
             counted(pixels, "pixel")
         );
     }
+    if let Some(wrong) = &night.site_or_time {
+        let _ = writeln!(text, "note       {wrong}");
+    }
     for moment in &night.moments {
         let _ = writeln!(text, "{:<10} {}", time_of(&moment.date), moment.to_text());
     }

@@ -5,6 +5,7 @@ use super::values;
 use crate::cli::exit::CommandError;
 use anyhow::Context as _;
 use clap::{Args, ValueEnum};
+use starpipe::UtcOffset;
 use starpipe::base::epoch::ObservationDate;
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::camera::{CameraModel, KnownLens};
@@ -39,6 +40,11 @@ pub(crate) struct HintOptions {
     /// and aberration [default: of frames, the date in the file's header, else in its name; else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     pub(crate) date: Option<ObservationDate>,
+    /// How many hours local times are ahead of UTC: those in names of files and in Exif, unless they say;
+    /// auto finds it by the stars over --site. Dates in FITS headers are UTC [default: not known, and such
+    /// a time tells no refraction]
+    #[arg(long, value_name = "HOURS|auto", allow_hyphen_values = true)]
+    pub(crate) utc_offset: Option<UtcOffset>,
     #[command(flatten)]
     observer: ObserverOptions,
     /// Which directions the attitude refers to
@@ -90,6 +96,7 @@ impl HintOptions {
         options.pixel_scale_arcsec = self.pixel_scale;
         options.near_deg = self.near.map(|near| [near.ra_deg, near.dec_deg]);
         options.date = self.date;
+        options.utc_offset = self.utc_offset;
         options.refine_lens = self.refine_lens;
         options.attitude_frame = self.frame_of.into();
         options.site = self.observer.site();

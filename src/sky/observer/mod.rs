@@ -121,6 +121,12 @@ impl Site {
         Self { air, ..self }
     }
 
+    /// The same height and air at another latitude and longitude, where these are in range.
+    pub(crate) fn moved_to(self, lat_deg: f64, lon_deg: f64) -> Option<Self> {
+        let site = Self::new(lat_deg, lon_deg, self.height_m).ok()?;
+        Some(site.with_air(self.air))
+    }
+
     /// The air.
     pub fn air(&self) -> Air {
         self.air

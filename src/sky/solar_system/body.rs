@@ -92,13 +92,17 @@ pub enum TimeError {
 }
 
 impl TimeError {
-    /// The largest error in days: zones are up to 14 h from UTC, midday up to 12 h from the hour.
-    pub(super) const fn days(self) -> f64 {
+    /// The largest error in hours: zones are up to 14 h from UTC, midday up to 12 h from the hour.
+    pub const fn hours(self) -> f64 {
         match self {
             Self::None => 0.0,
-            Self::Zone => 14.0 / 24.0,
-            Self::Day => 26.0 / 24.0,
+            Self::Zone => 14.0,
+            Self::Day => 26.0,
         }
+    }
+
+    pub(super) const fn days(self) -> f64 {
+        self.hours() / 24.0
     }
 }
 

@@ -122,10 +122,7 @@ pub fn run(
 
 /// The context of the identification: date and site are known.
 fn context<'a>(published: &Published, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
-    let date = FrameDate {
-        date: published.date,
-        source: DateSource::User,
-    };
+    let date = FrameDate::stated(published.date, DateSource::User);
     Context {
         priors: Priors {
             date: Some(date),

@@ -81,10 +81,7 @@ impl SkyStudy<'_> {
                 extinction: None,
             }),
             priors: Priors {
-                date: Some(FrameDate {
-                    date: conditions.date(),
-                    source: DateSource::User,
-                }),
+                date: Some(FrameDate::stated(conditions.date(), DateSource::User)),
                 site: Some(self.site),
                 exposure_s: Some(conditions.exposure_s),
                 ..Priors::default()

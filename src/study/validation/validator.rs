@@ -124,10 +124,7 @@ impl<'a> Validator<'a> {
                 // Without the exposure: the limit is predicted here, once for all frames.
                 camera,
                 priors: Priors {
-                    date: Some(FrameDate {
-                        date,
-                        source: DateSource::User,
-                    }),
+                    date: Some(FrameDate::stated(date, DateSource::User)),
                     site: protocol.site,
                     ..Priors::default()
                 },

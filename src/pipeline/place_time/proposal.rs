@@ -1,0 +1,193 @@
+//! What would put a place and a time right.
+
+use super::change::{Candidate, Change, longitude_of_hours};
+use super::{Contradiction, PlaceTime};
+use crate::base::epoch::ObservationDate;
+use crate::base::format::counted;
+use crate::base::units::DEG_PER_RAD;
+use crate::sky::observer::Site;
+use std::fmt;
+
+/// A change that would put a place and a time right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Proposal {
+    /// The change that explains the frame best, of its kind.
+    pub change: Change,
+    /// The place with it.
+    pub site: Site,
+    /// The time with it.
+    pub date: ObservationDate,
+    /// Changes of the same kind that explain the frame nearly as well: from and to this, in the unit of the
+    /// change.
+    pub range: Option<[f64; 2]>,
+    /// Odds of the best proposal against it, at least 1.
+    pub odds_against: f64,
+}
+
+/// Proposals that the best one beats by these odds are left out.
+const MAX_ODDS: f64 = 300.0;
+
+/// Of changes with their costs, those that are nearly as good as the best, one of each kind.
+pub(super) fn of(mut assessed: Vec<(Candidate, f64)>) -> Vec<Proposal> {
+    assessed.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let Some(least) = assessed.first().map(|(_, cost)| *cost) else {
+        return Vec::new();
+    };
+    assessed.retain(|(_, cost)| *cost - least < libm::log(MAX_ODDS));
+    let mut proposals: Vec<Proposal> = Vec::new();
+    for (candidate, cost) in assessed {
+        let amount = candidate.change.amount();
+        let same = proposals.iter_mut().find(|kept| {
+            let are_of_kind = kept.change.code() == candidate.change.code();
+            are_of_kind && kept.is_forward() == amount.map(|amount| amount > 0.0)
+        });
+        match (same, amount) {
+            (Some(kept), Some(amount)) => kept.widen(amount),
+            _ => proposals.push(Proposal {
+                change: candidate.change,
+                site: candidate.site,
+                date: candidate.date,
+                range: amount.map(|amount| [amount; 2]),
+                odds_against: libm::exp(cost - least),
+            }),
+        }
+    }
+    proposals
+}
+
+impl Proposal {
+    fn is_forward(&self) -> Option<bool> {
+        self.change.amount().map(|amount| amount > 0.0)
+    }
+
+    fn widen(&mut self, amount: f64) {
+        if let Some([from, to]) = &mut self.range {
+            *from = from.min(amount);
+            *to = to.max(amount);
+        }
+    }
+
+    /// From the smaller shift to the larger one.
+    fn sizes(&self) -> [f64; 2] {
+        let [a, b] = self.range.unwrap_or_default().map(f64::abs);
+        [a.min(b), a.max(b)]
+    }
+}
+
+/// What it says: `latitude -47.10 in place of 47.10`.
+impl fmt::Display for Proposal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (lat, lon) = (self.site.lat_deg(), self.site.lon_deg());
+        match self.change {
+            Change::LatitudeSign => write!(f, "the latitude {lat:.2}° (other sign)"),
+            Change::LongitudeSign => write!(f, "the longitude {lon:.2}° (other sign)"),
+            Change::BothSigns => write!(f, "the site {lat:.2},{lon:.2} (both signs)"),
+            Change::Exchanged => write!(f, "the site {lat:.2},{lon:.2} (exchanged)"),
+            Change::Place => write!(
+                f,
+                "another site, near {lat:.0},{lon:.0} if the camera looks straight up"
+            ),
+            Change::OrderOfDate => write!(
+                f,
+                "the date {} (its numbers in another order)",
+                self.date.to_iso()
+            ),
+            Change::Hours(hours) => {
+                let [least, most] = self.sizes();
+                let word = if hours > 0.0 { "later" } else { "earlier" };
+                let (clock, way) = if hours > 0.0 {
+                    ("behind", "east")
+                } else {
+                    ("ahead of", "west")
+                };
+                write!(
+                    f,
+                    "a time {} h {word} ({}: a clock {} h {clock} UTC, or a longitude {:.0}° further {way})",
+                    range_text(least, most),
+                    self.date.to_iso(),
+                    hours.abs(),
+                    longitude_of_hours(hours.abs())
+                )
+            }
+            Change::Days(days) => {
+                let [least, most] = self.sizes();
+                let word = if days > 0 { "later" } else { "earlier" };
+                write!(f, "a date {} days {word}", range_text(least, most))
+            }
+            Change::Years(years) => {
+                let word = if years > 0 { "later" } else { "earlier" };
+                write!(
+                    f,
+                    "the date {}, {} {word}",
+                    self.date.to_iso(),
+                    counted(years.unsigned_abs() as usize, "year")
+                )
+            }
+        }
+    }
+}
+
+fn range_text(least: f64, most: f64) -> String {
+    if least == most {
+        format!("{least}")
+    } else {
+        format!("{least} to {most}")
+    }
+}
+
+/// What is wrong, and what would put it right, in a sentence.
+impl fmt::Display for PlaceTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reasons: Vec<String> = self
+            .contradictions
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        write!(
+            f,
+            "the site or the time is not this frame's, and neither is used: {}; ",
+            reasons.join("; ")
+        )?;
+        let proposals: Vec<String> = self.proposals.iter().map(ToString::to_string).collect();
+        match &proposals[..] {
+            [] => f.write_str("no single change of a sign, the hours, or the date puts it right"),
+            [only] => write!(f, "{only} would put it right"),
+            [others @ .., last] => write!(
+                f,
+                "one of these would put it right: {}; or {last}",
+                others.join("; ")
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StarsBelowHorizon {
+                below,
+                named,
+                lowest_rad,
+            } => write!(
+                f,
+                "{below} of {named} sure stars would be below the horizon, down to {:.0}°",
+                lowest_rad * DEG_PER_RAD
+            ),
+            Self::Refraction { .. } => f.write_str(
+                "with the refraction there the stars are farther from their places than without any",
+            ),
+            Self::SunIsUp { altitude_rad } => write!(
+                f,
+                "the Sun would stand at an altitude of {:.0}°, and hide the fainter of the stars",
+                altitude_rad * DEG_PER_RAD
+            ),
+            Self::Planets { missing, seen } => write!(
+                f,
+                "{} would be in the frame and is not, and where {} is at another date there is a bright source that is no star",
+                missing.name(),
+                seen.name()
+            ),
+        }
+    }
+}
