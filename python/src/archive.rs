@@ -69,7 +69,8 @@ pub fn archive_plan(
 /// Where two contents of `archive.json` differ: a text for each value.
 #[pyfunction]
 pub fn archive_differences(found: &str, wanted: &str) -> PyResult<Vec<String>> {
-    let read = |text| Identity::read(text).map_err(exception);
+    let damaged = || PyValueError::new_err("archive.json is damaged");
+    let read = |text| Identity::read(text).ok_or_else(damaged);
     Ok(read(found)?.differences(&read(wanted)?))
 }
 

@@ -4,7 +4,7 @@ use crate::pipeline::SolveOptions;
 use crate::sky::catalog::Catalog;
 use serde::Serialize;
 use std::path::Path;
-use std::{fs, io};
+use std::{fmt, fs, io};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// What the frames of an archive are solved with: results of other values are never mixed.
@@ -54,6 +54,12 @@ impl From<&Catalog> for CatalogIdentity {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct FileHash(String);
+
+impl fmt::Display for FileHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
 
 impl FileHash {
     /// The hash of a content.

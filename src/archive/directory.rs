@@ -1,16 +1,17 @@
 //! The directory of an archive: whose it is, and its parts.
 
-use super::configuration::Configuration;
+use super::configuration::{Configuration, FileHash};
 use super::error::ArchiveError;
 use super::frame_row::FrameRow;
 use super::identity::Identity;
 use super::plan::{Part, Plan};
+use super::read::is_readable;
 use super::write::TableWriter;
 use crate::base::files;
 use crate::base::table::Column;
 use crate::report::StarRow;
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -21,6 +22,8 @@ const INPUTS: &str = "inputs.txt";
 /// Directories of the parts of each table.
 const FRAMES: &str = "frames.parquet";
 const STARS: &str = "stars.parquet";
+/// Directory of the checksums of each part's tables.
+const CHECKSUMS: &str = "checksums";
 
 /// The directory of an archive.
 #[derive(Debug)]
@@ -28,6 +31,18 @@ pub struct Archive {
     directory: PathBuf,
     plan: Plan,
     identity: Identity,
+    mended: Vec<PathBuf>,
+}
+
+/// Whether a part is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PartState {
+    /// It is not.
+    Missing,
+    /// It is, and was changed since.
+    Damaged,
+    /// It is as it was written.
+    Whole,
 }
 
 impl Archive {
@@ -35,7 +50,8 @@ impl Archive {
     ///
     /// # Errors
     /// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::Foreign`] if it has
-    /// tables of another kind, [`ArchiveError::File`], [`ArchiveError::Json`].
+    /// tables of another kind, [`ArchiveError::Damaged`] if nothing tells whose it is,
+    /// [`ArchiveError::File`], [`ArchiveError::Json`].
     pub fn claim(
         directory: &Path,
         plan: Plan,
@@ -51,37 +67,62 @@ impl Archive {
             });
         }
         let identity = Identity::new(&plan, configuration).map_err(ArchiveError::json(&path))?;
-        claim_file(directory, IDENTITY, &identity)?;
-        make_directory(&directory.join(FRAMES))?;
-        make_directory(&directory.join(STARS))?;
-        let archive = Self {
+        let mut archive = Self {
             directory: directory.to_owned(),
             plan,
             identity,
+            mended: Vec::new(),
         };
+        let is_mended = claim_file(directory, IDENTITY, &archive.identity, || archive.is_own())?;
+        archive.mended.extend(is_mended.then_some(path));
+        for part_of in [FRAMES, STARS, CHECKSUMS] {
+            make_directory(&directory.join(part_of))?;
+        }
         archive.write_inputs()?;
         Ok(archive)
+    }
+
+    /// Whether the parts that are there are of this run, by their names.
+    fn is_own(&self) -> bool {
+        let files = fs::read_dir(self.directory.join(FRAMES));
+        let mut names = files.into_iter().flatten().flatten();
+        let has_others = names.any(|file| file.file_name().to_string_lossy().starts_with("part-"));
+        let own = || self.plan.parts().any(|part| self.frames_of(&part).exists());
+        !has_others || own()
+    }
+
+    /// Files that say whose the directory is and that were damaged: they were written anew.
+    pub fn mended(&self) -> &[PathBuf] {
+        &self.mended
     }
 
     /// The archive in `directory`.
     ///
     /// # Errors
-    /// [`ArchiveError::NoArchive`], [`ArchiveError::File`], [`ArchiveError::Json`].
+    /// [`ArchiveError::NoArchive`], [`ArchiveError::Damaged`], [`ArchiveError::File`].
     pub fn open(directory: &Path) -> Result<Self, ArchiveError> {
         let (path, inputs) = (directory.join(IDENTITY), directory.join(INPUTS));
-        let text = match fs::read_to_string(&path) {
+        let damaged = |path: &Path| ArchiveError::Damaged(path.to_owned());
+        let text = match fs::read(&path) {
             Err(error) if error.kind() == ErrorKind::NotFound => {
                 return Err(ArchiveError::NoArchive(directory.to_owned()));
             }
             read => read.map_err(ArchiveError::file("reading", &path))?,
         };
-        let identity = Identity::read(&text).map_err(ArchiveError::json(&path))?;
-        let names = fs::read_to_string(&inputs).map_err(ArchiveError::file("reading", &inputs))?;
+        let identity = std::str::from_utf8(&text).ok().and_then(Identity::read);
+        let identity = identity.ok_or_else(|| damaged(&path))?;
+        let names = fs::read(&inputs).map_err(ArchiveError::file("reading", &inputs))?;
+        let names = String::from_utf8(names).map_err(|_| damaged(&inputs))?;
         let names = names.lines().map(str::to_owned).collect();
+        let plan = Plan::new(names, identity.frames_per_part())?;
+        if !identity.is_of(&plan) {
+            return Err(damaged(&inputs));
+        }
         Ok(Self {
             directory: directory.to_owned(),
-            plan: Plan::new(names, identity.frames_per_part())?,
+            plan,
             identity,
+            mended: Vec::new(),
         })
     }
 
@@ -116,10 +157,54 @@ impl Archive {
             .join(part.file_name(self.identity.text()))
     }
 
-    /// Whether a part is written.
-    pub fn has(&self, part: &Part<'_>) -> bool {
+    /// Whether a part is written, and both of its tables are as they were.
+    pub fn state(&self, part: &Part<'_>) -> PartState {
+        self.state_of(part, &[FRAMES, STARS])
+    }
+
+    /// The same by the table of frames alone.
+    pub fn state_of_frames(&self, part: &Part<'_>) -> PartState {
+        self.state_of(part, &[FRAMES])
+    }
+
+    fn state_of(&self, part: &Part<'_>, tables: &[&str]) -> PartState {
         // The table of frames is written last.
-        self.frames_of(part).exists()
+        if !self.frames_of(part).exists() {
+            return PartState::Missing;
+        }
+        let checksums = fs::read_to_string(self.checksums_of(part));
+        let is_whole = |table: &&str| {
+            let path = self.table_of(table, part);
+            match &checksums {
+                Ok(known) => checksum_line(table, &path).is_ok_and(|line| known.contains(&line)),
+                // Another program may have written it.
+                Err(_) => is_readable(&path),
+            }
+        };
+        if tables.iter().all(is_whole) {
+            PartState::Whole
+        } else {
+            PartState::Damaged
+        }
+    }
+
+    fn checksums_of(&self, part: &Part<'_>) -> PathBuf {
+        let name = part.file_name(self.identity.text());
+        let path = self.directory.join(CHECKSUMS).join(name);
+        path.with_extension("txt")
+    }
+
+    /// The parts whose tables of frames are whole.
+    pub fn parts_with_frames(&self) -> impl Iterator<Item = Part<'_>> {
+        let is_whole = |part: &Part<'_>| self.state_of_frames(part) == PartState::Whole;
+        self.plan.parts().filter(is_whole)
+    }
+
+    /// The tables of frames that were changed since they were written.
+    pub fn damaged_frames(&self) -> Vec<PathBuf> {
+        let parts = self.plan.parts();
+        let damaged = parts.filter(|part| self.state_of_frames(part) == PartState::Damaged);
+        damaged.map(|part| self.frames_of(&part)).collect()
     }
 
     /// Begins to write a part, into a directory that [`claim`](Self::claim) has made.
@@ -130,16 +215,20 @@ impl Archive {
         Ok(PartWriter {
             frames: open_table(self.frames_of(part), "frames", FrameRow::columns())?,
             stars: open_table(self.stars_of(part), "stars", StarRow::columns())?,
+            checksums: self.checksums_of(part),
         })
     }
 
-    fn write_inputs(&self) -> Result<(), ArchiveError> {
+    fn write_inputs(&mut self) -> Result<(), ArchiveError> {
         let path = self.directory.join(INPUTS);
-        if path.exists() {
+        let names = self.plan.names().join("\n") + "\n";
+        let found = fs::read(&path);
+        if found.as_ref().is_ok_and(|found| found == names.as_bytes()) {
             return Ok(());
         }
-        let names = self.plan.names().join("\n") + "\n";
-        files::write(&path, names.as_bytes()).map_err(ArchiveError::file("writing", &path))
+        files::write(&path, names.as_bytes()).map_err(ArchiveError::file("writing", &path))?;
+        self.mended.extend(found.is_ok().then_some(path));
+        Ok(())
     }
 }
 
@@ -153,6 +242,7 @@ struct OpenTable<R> {
 pub struct PartWriter {
     frames: OpenTable<FrameRow>,
     stars: OpenTable<StarRow>,
+    checksums: PathBuf,
 }
 
 impl PartWriter {
@@ -174,8 +264,18 @@ impl PartWriter {
     /// # Errors
     /// [`ArchiveError::File`], [`ArchiveError::Table`].
     pub fn finish(self) -> Result<(), ArchiveError> {
-        self.stars.finish()?;
-        self.frames.finish()
+        let stars = self.stars.written()?;
+        let frames = self.frames.written()?;
+        let path = &self.checksums;
+        let lines = || {
+            let stars = checksum_line(STARS, stars.file.path())?;
+            Ok(checksum_line(FRAMES, frames.file.path())? + &stars)
+        };
+        let write = |lines: String| files::write(path, lines.as_bytes());
+        let written = lines().and_then(write);
+        written.map_err(ArchiveError::file("writing", path))?;
+        stars.finish()?;
+        frames.finish()
     }
 }
 
@@ -200,27 +300,62 @@ impl<R> OpenTable<R> {
         added.map_err(ArchiveError::table("writing", &self.path))
     }
 
-    fn finish(self) -> Result<(), ArchiveError> {
+    fn written(self) -> Result<WrittenTable, ArchiveError> {
         let Self { path, writer } = self;
-        let written = writer
+        let file = writer
             .finish()
             .map_err(ArchiveError::table("writing", &path))?;
-        files::finish(written, &path).map_err(ArchiveError::file("writing", &path))
+        Ok(WrittenTable { path, file })
     }
 }
 
-/// Takes `directory` for a run by a file of this name in it.
+/// A table that is written, and has no name yet.
+struct WrittenTable {
+    path: PathBuf,
+    file: NamedTempFile,
+}
+
+impl WrittenTable {
+    fn finish(self) -> Result<(), ArchiveError> {
+        let Self { path, file } = self;
+        files::finish(file, &path).map_err(ArchiveError::file("writing", &path))
+    }
+}
+
+/// The line of a table among the checksums of a part; its content is in the file `path`.
+fn checksum_line(table: &str, path: &Path) -> io::Result<String> {
+    Ok(format!("{table} {}\n", FileHash::of_file(path)?))
+}
+
+/// Takes `directory` for a run by a file of this name in it. A damaged one is written anew if `is_own` says that
+/// the results in the directory are of this run. Returns whether it was.
 ///
 /// # Errors
-/// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::File`],
-/// [`ArchiveError::Json`].
-pub fn claim_file(directory: &Path, name: &str, identity: &Identity) -> Result<(), ArchiveError> {
+/// [`ArchiveError::OtherRun`] if it belongs to another run, [`ArchiveError::Damaged`] if nothing tells
+/// whose it is, [`ArchiveError::File`].
+pub fn claim_file(
+    directory: &Path,
+    name: &str,
+    identity: &Identity,
+    is_own: impl Fn() -> bool,
+) -> Result<bool, ArchiveError> {
     let path = directory.join(name);
-    if !is_claimed(&path, identity.text())? {
-        // Another worker may have been faster.
-        check_same(directory, &path, identity)?;
+    if is_claimed(&path, identity.text())? {
+        return Ok(false);
     }
-    Ok(())
+    // Another worker may have been faster.
+    let text = fs::read(&path).map_err(ArchiveError::file("reading", &path))?;
+    let found = std::str::from_utf8(&text).ok().and_then(Identity::read);
+    if let Some(found) = found {
+        check_same(directory, &found, identity)?;
+        return Ok(false);
+    }
+    if !is_own() {
+        return Err(ArchiveError::Damaged(path));
+    }
+    let written = files::write(&path, identity.text().as_bytes());
+    written.map_err(ArchiveError::file("writing", &path))?;
+    Ok(true)
 }
 
 /// Writes the identity unless there is one; says whether it was written.
@@ -243,9 +378,7 @@ fn is_claimed(path: &Path, identity: &str) -> Result<bool, ArchiveError> {
 }
 
 /// Refuses a directory of another run.
-fn check_same(directory: &Path, path: &Path, wanted: &Identity) -> Result<(), ArchiveError> {
-    let text = fs::read_to_string(path).map_err(ArchiveError::file("reading", path))?;
-    let found = Identity::read(&text).map_err(ArchiveError::json(path))?;
+fn check_same(directory: &Path, found: &Identity, wanted: &Identity) -> Result<(), ArchiveError> {
     let differences = found.differences(wanted);
     if differences.is_empty() {
         return Ok(());

@@ -30,12 +30,15 @@ pub enum ArchiveError {
     /// There is no archive in the directory.
     #[error("{} has no archive.json: no archive has begun in it", .0.display())]
     NoArchive(PathBuf),
-    /// Parts are missing.
-    #[error("{missing} of {parts} parts are missing in {}: see `starpipe archive status`", .directory.display())]
+    /// A file that says whose the directory is was changed since it was written.
+    #[error("{} is damaged; the command that wrote the directory writes it anew, if results show that they are its own", .0.display())]
+    Damaged(PathBuf),
+    /// Parts are missing or damaged.
+    #[error("{missing} of {parts} parts are missing or damaged in {}: see `starpipe archive status`", .directory.display())]
     Unfinished {
         /// The directory.
         directory: PathBuf,
-        /// Missing parts.
+        /// Missing and damaged parts.
         missing: usize,
         /// All parts.
         parts: usize,

@@ -89,13 +89,13 @@ impl FrameSummary {
     }
 }
 
-/// The frames of the parts that are written, in the order of their names.
+/// The frames of the parts that are whole, in the order of their names.
 ///
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`].
 pub fn frames(archive: &Archive) -> Result<Vec<FrameSummary>, ArchiveError> {
     let mut frames = Vec::new();
-    for part in archive.plan().parts().filter(|part| archive.has(part)) {
+    for part in archive.parts_with_frames() {
         let path = archive.frames_of(&part);
         let read = for_each_row(open(&path)?, &COLUMNS, |row| {
             frames.push(FrameSummary::of(row));

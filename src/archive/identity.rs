@@ -3,12 +3,16 @@
 use super::configuration::Configuration;
 use super::plan::Plan;
 use crate::base::differences::differences;
+use crate::base::sealed::{is_intact, sealed};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::num::NonZeroUsize;
 
 /// Version of the tables.
 pub const SCHEMA: u32 = 1;
+
+/// Whose checksum it has.
+const SEAL: &str = "identity";
 
 /// All that the tables depend on, as `archive.json` has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,20 +43,20 @@ impl Identity {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             frames_per_part: plan.frames_per_part(),
             frames: plan.names().len(),
-            names: format!("{:016x}", plan.hash()),
+            names: names_hash(plan),
             configuration: serde_json::to_value(configuration)?,
         };
-        let text = serde_json::to_string_pretty(&known)? + "\n";
+        let text = sealed(&serde_json::to_string_pretty(&known)?, SEAL) + "\n";
         Ok(Self { known, text })
     }
 
-    /// Reads the content of `archive.json`.
-    ///
-    /// # Errors
-    /// [`serde_json::Error`] if it is another file.
-    pub fn read(text: &str) -> serde_json::Result<Self> {
-        Ok(Self {
-            known: serde_json::from_str(text)?,
+    /// Reads the content of `archive.json`; `None` if it is not what was written.
+    pub fn read(text: &str) -> Option<Self> {
+        if !is_intact(text.strip_suffix('\n')?, SEAL) {
+            return None;
+        }
+        Some(Self {
+            known: serde_json::from_str(text).ok()?,
             text: text.to_owned(),
         })
     }
@@ -60,6 +64,11 @@ impl Identity {
     /// The content of `archive.json`.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Whether it is of the frames of `plan`.
+    pub(super) fn is_of(&self, plan: &Plan) -> bool {
+        self.known.names == names_hash(plan)
     }
 
     /// Frames of a part, but for the last one.
@@ -72,4 +81,8 @@ impl Identity {
         let value = |identity: &Self| serde_json::to_value(&identity.known).unwrap_or_default();
         differences(&value(self), &value(wanted))
     }
+}
+
+fn names_hash(plan: &Plan) -> String {
+    format!("{:016x}", plan.hash())
 }

@@ -1,8 +1,9 @@
 //! One file of each table, of all parts.
 
-use super::directory::Archive;
+use super::directory::{Archive, PartState};
 use super::error::ArchiveError;
 use super::guard::guarded;
+use super::plan::Part;
 use super::read::open;
 use super::votable::{CONTENT_KEY, widened};
 use super::write::describe;
@@ -22,11 +23,12 @@ use std::sync::Arc;
 /// Rows are in the order of the frames' names; they are copied as they are.
 ///
 /// # Errors
-/// [`ArchiveError::Unfinished`] if parts are missing, [`ArchiveError::File`],
+/// [`ArchiveError::Unfinished`] if parts are missing or damaged, [`ArchiveError::File`],
 /// [`ArchiveError::Table`].
 pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2], ArchiveError> {
     let parts: Vec<_> = archive.plan().parts().collect();
-    let missing = parts.iter().filter(|part| !archive.has(part)).count();
+    let is_missing = |part: &&Part<'_>| archive.state(part) != PartState::Whole;
+    let missing = parts.iter().filter(is_missing).count();
     if missing > 0 {
         return Err(ArchiveError::Unfinished {
             directory: archive.directory().to_owned(),

@@ -6,7 +6,7 @@
 //! 1. The names are sorted, and cut into parts of a fixed number of frames. A worker takes every
 //!    n-th part ([`Plan::shard`]), so the parts do not depend on the number of workers.
 //! 2. A part is written whole: its name has a hash of its frames and of the configuration. A part that
-//!    is there is done.
+//!    is there is done, unless its checksums tell that it was changed since.
 //! 3. A directory belongs to one list of frames and one configuration ([`Archive::claim`]). Another
 //!    one is refused, and told what differs.
 //!
@@ -28,7 +28,7 @@ mod votable;
 mod write;
 
 pub use configuration::{CatalogIdentity, Configuration, FileHash, NightConfiguration};
-pub use directory::{Archive, PartWriter, claim_file};
+pub use directory::{Archive, PartState, PartWriter, claim_file};
 pub use error::ArchiveError;
 pub use frame_row::FrameRow;
 pub use frames::{FrameSummary, frames};

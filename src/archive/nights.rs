@@ -102,13 +102,13 @@ impl Nights {
     }
 }
 
-/// What each camera saw in each night, by night and camera.
+/// What each camera saw in each night, by night and camera, in the parts that are whole.
 ///
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`].
 pub fn summary(archive: &Archive) -> Result<Vec<NightSummary>, ArchiveError> {
     let mut nights = Nights::default();
-    for part in archive.plan().parts().filter(|part| archive.has(part)) {
+    for part in archive.parts_with_frames() {
         let path = archive.frames_of(&part);
         let added = nights.add(open(&path)?);
         added.map_err(ArchiveError::table("reading", &path))?;

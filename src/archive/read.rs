@@ -28,6 +28,17 @@ pub(super) fn for_each_row(
     Ok(())
 }
 
+/// Whether all values of a table can be read.
+pub(super) fn is_readable(path: &Path) -> bool {
+    let read = |file: File| {
+        let reader = guarded(|| SerializedFileReader::new(file))?;
+        let mut rows = guarded(|| reader.get_row_iter(None))?;
+        while guarded(|| rows.next().transpose())?.is_some() {}
+        Ok::<(), ParquetError>(())
+    };
+    open(path).is_ok_and(|file| read(file).is_ok())
+}
+
 /// Opens the file of a table.
 pub(super) fn open(path: &Path) -> Result<File, ArchiveError> {
     files::open(path).map_err(ArchiveError::file("reading", path))

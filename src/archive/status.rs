@@ -1,6 +1,6 @@
 //! How far an archive is.
 
-use super::directory::Archive;
+use super::directory::{Archive, PartState};
 use super::error::ArchiveError;
 use super::frame_row::UNREAD;
 use super::read::{for_each_row, open, text};
@@ -11,13 +11,15 @@ use serde::Serialize;
 pub struct Status {
     /// Parts in all.
     pub parts: usize,
-    /// Parts that are written.
+    /// Parts that are written and whole.
     pub parts_done: usize,
     /// Numbers of the parts that are missing, from 0.
     pub missing_parts: Vec<usize>,
+    /// Numbers of the parts that were changed since they were written, from 0.
+    pub damaged_parts: Vec<usize>,
     /// Files in all.
     pub files: usize,
-    /// Files in the parts that are written.
+    /// Files in the parts that are whole.
     pub files_done: usize,
     /// Frames in those parts; a file may have several.
     pub frames: usize,
@@ -39,7 +41,7 @@ pub struct UnreadFrame {
 }
 
 impl Status {
-    /// Whether all parts are written.
+    /// Whether all parts are written and whole.
     pub fn is_complete(&self) -> bool {
         self.parts_done == self.parts
     }
@@ -57,8 +59,13 @@ pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
         ..Status::default()
     };
     for part in plan.parts() {
-        if !archive.has(&part) {
-            status.missing_parts.push(part.number);
+        let lost = match archive.state(&part) {
+            PartState::Missing => Some(&mut status.missing_parts),
+            PartState::Damaged => Some(&mut status.damaged_parts),
+            PartState::Whole => None,
+        };
+        if let Some(lost) = lost {
+            lost.push(part.number);
             continue;
         }
         status.parts_done += 1;

@@ -12,6 +12,7 @@ pub mod interrupt;
 pub(crate) mod neighbors;
 pub mod panics;
 pub mod remedy;
+pub mod sealed;
 pub mod size;
 pub mod statistics;
 pub mod table;

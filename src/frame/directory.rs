@@ -2,6 +2,7 @@
 
 use super::compressed::format_inside;
 use super::error::FrameError;
+use super::folder::OtherFile;
 use super::foreign;
 use super::format::FrameFormat;
 use super::limits::HEAD_BYTES;
@@ -15,7 +16,7 @@ pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 
 /// The files in `directory` that begin like an image or are named as one, sorted by name.
 ///
-/// Left out are subdirectories and products of starpipe: overlays ([`is_overlay`]), calibration
+/// Left out are subdirectories, hidden files, and products of starpipe: overlays ([`is_overlay`]), calibration
 /// frames ([`is_calibration_frame`]), copies of frames ([`is_copy`]), tables ([`is_table`]) and headers without an image (`.wcs`). A file that cannot be
 /// opened or is empty or damaged is listed, so that reading it reports the error.
 /// # Errors
@@ -23,7 +24,7 @@ pub(crate) const OVERLAY_TEXT: (&str, &str) = ("Software", "starpipe overlay");
 /// frames, with the first file in a format that is not read and [`FrameError::ForeignFormat`].
 pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
     let files = all_files_in(directory).map_err(|e| FrameError::from(e).in_file(directory))?;
-    let is_frame = |path: &&PathBuf| is_listed(path).unwrap_or(true);
+    let is_frame = |path: &&PathBuf| other_kind(path).is_none();
     let frames: Vec<PathBuf> = files.iter().filter(is_frame).cloned().collect();
     if !frames.is_empty() {
         return Ok(frames);
@@ -35,20 +36,20 @@ pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
 }
 
 /// The error of the first file in a format that is known but not read.
-fn foreign_file(files: &[PathBuf]) -> Option<FrameError> {
+pub(super) fn foreign_file(files: &[PathBuf]) -> Option<FrameError> {
     files.iter().find_map(|path| {
         let known = foreign::of(&head_of(path).ok()?)?;
         Some(FrameError::from(known).in_file(path))
     })
 }
 
-fn head_of(path: &Path) -> io::Result<Vec<u8>> {
+pub(super) fn head_of(path: &Path) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
     files::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?;
     Ok(head)
 }
 
-fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
+pub(super) fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(directory)? {
         let path = entry?.path();
@@ -109,33 +110,65 @@ fn is_created_by(head: &[u8], creator: &str) -> bool {
 
 /// Whether a file is named as an image of a format that is read.
 fn is_named_as_an_image(path: &Path) -> bool {
-    const EXTENSIONS: [&str; 11] = [
-        "fits", "fit", "fts", "fz", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "pgm",
-    ];
-    path.extension().is_some_and(|extension| {
-        EXTENSIONS
-            .iter()
-            .any(|known| extension.eq_ignore_ascii_case(known))
-    })
+    has_extension(
+        path,
+        &[
+            "fits", "fit", "fts", "fz", "tif", "tiff", "png", "jpg", "jpeg", "bmp", "pgm",
+        ],
+    )
 }
 
-/// Whether a file begins like a frame or is named as one, and is no product of starpipe.
-fn is_listed(path: &Path) -> io::Result<bool> {
-    if path.extension().is_some_and(|extension| extension == "wcs") {
-        return Ok(false);
+/// Whether a file is named as a video: one that is not finished may have no signature.
+fn is_named_as_a_video(path: &Path) -> bool {
+    has_extension(
+        path,
+        &[
+            "mp4", "mov", "m4v", "avi", "mkv", "webm", "mpg", "mpeg", "ser", "vid",
+        ],
+    )
+}
+
+fn has_extension(path: &Path, known: &[&str]) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    known
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// What a file is by its name and first bytes, if it is no image that is read; `None` for one that cannot be
+/// opened, so that reading it reports why.
+pub(super) fn other_kind(path: &Path) -> Option<OtherFile> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if name.starts_with('.') {
+        return Some(OtherFile::Hidden);
     }
-    let head = head_of(path)?;
-    Ok(match FrameFormat::of(&head) {
-        Some(FrameFormat::Png | FrameFormat::Jpeg) => !is_overlay(&head),
+    if path.extension().is_some_and(|extension| extension == "wcs") {
+        return Some(OtherFile::Product);
+    }
+    let head = head_of(path).ok()?;
+    let (is_image, is_product) = match FrameFormat::of(&head) {
+        Some(FrameFormat::Png | FrameFormat::Jpeg) => (true, is_overlay(&head)),
         Some(FrameFormat::Fits) => {
-            !is_calibration_frame(&head) && !is_copy(&head) && !is_table(&head)
+            let is_product = is_calibration_frame(&head) || is_copy(&head) || is_table(&head);
+            (true, is_product)
         }
         Some(format) if format.is_compressed() => {
             let (known, inside) = format_inside(&head, format);
             // As in `night.fits.bz2`.
             let inner = path.file_stem().map(Path::new);
-            known.is_some() || (inside.is_empty() && inner.is_some_and(is_named_as_an_image))
+            let is_named = inside.is_empty() && inner.is_some_and(is_named_as_an_image);
+            (known.is_some() || is_named, false)
         }
-        format => format.is_some() || is_named_as_an_image(path),
-    })
+        format => (format.is_some() || is_named_as_an_image(path), false),
+    };
+    match (is_image, is_product) {
+        (_, true) => Some(OtherFile::Product),
+        (true, false) => None,
+        (false, false) => Some(match foreign::of(&head) {
+            Some(known) if known.is_video() => OtherFile::Video,
+            Some(_) => OtherFile::OtherFormat,
+            None if is_named_as_a_video(path) => OtherFile::Video,
+            None => OtherFile::NoImage,
+        }),
+    }
 }

@@ -19,6 +19,13 @@ pub(super) struct Foreign {
     pub advice: &'static str,
 }
 
+impl Foreign {
+    /// Whether it has many pictures, one after the other in time.
+    pub(super) fn is_video(&self) -> bool {
+        self.name.ends_with("video")
+    }
+}
+
 impl From<Foreign> for FrameError {
     fn from(known: Foreign) -> Self {
         Self::ForeignFormat {
@@ -48,6 +55,10 @@ const MP4: Foreign = Foreign {
     name: "an MP4 or QuickTime video",
     advice: "save its frames as PNG first, for example with ffmpeg -i FILE frame-%04d.png",
 };
+const MATROSKA: Foreign = Foreign {
+    name: "a Matroska or WebM video",
+    advice: MP4.advice,
+};
 const AVI: Foreign = Foreign {
     name: "an AVI video",
     advice: VIDEO,
@@ -69,7 +80,8 @@ const fn picture(name: &'static str) -> Foreign {
 }
 
 /// Formats with a signature at the beginning.
-const SIGNATURES: [(&[u8], Foreign); 20] = [
+const SIGNATURES: [(&[u8], Foreign); 21] = [
+    (b"\x1a\x45\xdf\xa3", MATROSKA),
     (
         b"FUJIFILMCCD-RAW",
         raw("a raw file of a Fujifilm camera (RAF)"),

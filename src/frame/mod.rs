@@ -36,6 +36,7 @@ mod directory;
 mod error;
 mod exif;
 mod fits;
+mod folder;
 mod foreign;
 mod format;
 mod image;
@@ -70,6 +71,8 @@ pub use directory::{
 pub use error::FrameError;
 pub(crate) use fits::{BLOCK_BYTES, write_rows};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
+#[doc(hidden)]
+pub use folder::{Cameras, Folder, OtherFile, PassedOver};
 pub use format::FrameFormat;
 pub use image::Frame;
 #[doc(hidden)]

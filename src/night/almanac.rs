@@ -16,6 +16,14 @@ const TWILIGHTS: [(f64, &str); 4] = [
     (-18.0, "astronomical"),
 ];
 
+/// Whether the Sun is over `site` at `date`; not where either is not known.
+pub fn is_by_day(date: Option<&ObservationDate>, site: Option<Site>) -> bool {
+    let almanac = date
+        .zip(site)
+        .and_then(|(date, site)| Almanac::at(date, site));
+    almanac.is_some_and(|almanac| almanac.twilight() == TWILIGHTS[0].1)
+}
+
 /// Where Moon and Sun are over a site. Angles are refracted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

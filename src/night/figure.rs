@@ -176,10 +176,10 @@ fn title(night: &NightSummary) -> String {
     } else {
         format!("{first} to {last}")
     }];
-    parts.push(match night.clear_hours {
-        Some(clear) => format!("{clear:.1} of {:.1} hours clear", night.hours),
-        None => format!("{:.1} hours", night.hours),
-    });
+    parts.extend(night.hours.map(|hours| match night.clear_hours {
+        Some(clear) => format!("{clear:.1} of {hours:.1} hours clear"),
+        None => format!("{hours:.1} hours"),
+    }));
     if let Some(hour) = &night.darkest_hour {
         parts.push(format!(
             "darkest hour V {:.2} mag/arcsec²",

@@ -11,7 +11,8 @@
 //! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
 //!    frames that agree with each other ([`PointingHistory`]).
 //! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels()`]).
-//! 5. The series tell when something changes ([`Moment`]).
+//! 5. A frame without stars that is of the day, a dark, or shows trails is passed over ([`NoSky`]).
+//! 6. The series tell when something changes ([`Moment`]).
 //!
 //! Caveats: a camera that follows the stars has no pointing in the horizon to hold; its frames are solved
 //! one by one.
@@ -23,20 +24,22 @@ mod departure;
 mod figure;
 mod hot_pixels;
 mod moments;
+mod no_sky;
 mod pointing;
 mod row;
 mod skyglow;
 mod start;
 mod summary;
 
-pub use almanac::Almanac;
+pub use almanac::{Almanac, is_by_day};
 pub use cells::{Hundredths, NightCells};
 pub use dark_level::{FrameLevel, dark_level};
 pub use figure::svg;
 pub use hot_pixels::{NightHotPixel, Standouts, hot_pixels};
 pub use moments::{Moment, MomentKind};
+pub use no_sky::NoSky;
 pub use pointing::{Knock, PointingHistory};
 pub use row::NightRow;
 pub use skyglow::{SkyglowStation, skyglow};
 pub use start::{NightStart, Probe, probe_order};
-pub use summary::{NightSummary, summarize};
+pub use summary::{NightSummary, PassedOverFiles, summarize};

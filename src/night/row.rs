@@ -2,6 +2,7 @@
 
 use super::almanac::Almanac;
 use super::cells::NightCells;
+use super::no_sky::NoSky;
 use super::start::horizon_attitude;
 use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::epoch::ObservationDate;
@@ -65,6 +66,8 @@ pub struct NightRow {
 
 /// Status of a frame whose stars are identified.
 const IDENTIFIED: &str = "identified";
+/// Status of a frame that shows no sky of the night.
+const PASSED_OVER: &str = "passed_over";
 /// Decimals of magnitudes, of angles in degrees, and of the elements of a quaternion.
 const MAG_DECIMALS: i32 = 3;
 const ANGLE_DECIMALS: i32 = 4;
@@ -79,8 +82,8 @@ impl NightRow {
             frame, "", "meta.id;meta.main", "File of the frame";
             date, "", "time.epoch", "Date in UTC";
             mjd, "d", "time.epoch", "The same as Modified Julian Date";
-            status, "", "meta.code.status", "identified, not_identified or unread";
-            reason_code, "", "meta.code.error", "Why its stars are not identified";
+            status, "", "meta.code.status", "identified, not_identified, unread or passed_over";
+            reason_code, "", "meta.code.error", "Why its stars are not identified, or what is passed over";
             pointing, "", "meta.code", "frame: by its stars; held: by the mount and the date";
             altitude_deg, "deg", "pos.az.alt", "Apparent altitude of the boresight";
             azimuth_deg, "deg", "pos.az.azi", "Azimuth of the boresight, from north through east";
@@ -156,6 +159,23 @@ impl NightRow {
             status: "unread".to_owned(),
             ..Self::default()
         }
+    }
+
+    /// The row of a frame that was read, and that shows no sky of the night.
+    pub fn passed_over(frame: &str, solution: &Solution, kind: NoSky) -> Self {
+        let date = solution.date.map(|known| known.date.to_iso());
+        Self {
+            frame: frame.to_owned(),
+            date: date.unwrap_or_default(),
+            status: PASSED_OVER.to_owned(),
+            reason_code: kind.code().to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// What it is, if it was passed over.
+    pub fn no_sky(&self) -> Option<NoSky> {
+        (self.status == PASSED_OVER).then(|| NoSky::of_code(&self.reason_code))?
     }
 
     /// Whether its stars are identified.

@@ -28,9 +28,13 @@ pub struct NightSummary {
     pub identified: usize,
     pub held: usize,
     pub unread: usize,
-    pub hours: f64,
+    pub passed_over: Vec<PassedOverFiles>,
+    pub timed: usize,
+    pub judged: usize,
+    pub clear: usize,
+    pub hours: Option<f64>,
     pub clear_hours: Option<f64>,
-    pub dark_hours: f64,
+    pub dark_hours: Option<f64>,
     pub clear_dark_hours: Option<f64>,
     pub darkest_hour: Option<DarkestHour>,
     pub median: Medians,
@@ -39,6 +43,15 @@ pub struct NightSummary {
     pub hot_pixels: Option<usize>,
     pub site_or_time: Option<String>,
     pub map: Vec<MapCell>,
+}
+
+/// Files of one kind that are no frames of the night.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "as in docs/json.md")]
+pub struct PassedOverFiles {
+    pub kind: String,
+    pub count: usize,
+    pub files: Vec<String>,
 }
 
 /// The hour with the darkest zenith.
@@ -73,14 +86,16 @@ pub struct MapCell {
     pub cloudy: Option<f64>,
 }
 
-/// The summary of `rows`, in the order of their dates.
+/// The summary of `rows`, in the order of their dates, without those of frames that were passed over.
 pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> NightSummary {
     let count = |is: fn(&NightRow) -> bool| rows.iter().filter(|row| is(row)).count();
-    let hours = |is: fn(&NightRow) -> bool| finite(hours_of(rows, is), 3).unwrap_or(0.0);
-    let is_known = rows.iter().any(|row| row.cloud_share.is_some());
+    let hours = |is: fn(&NightRow) -> bool| hours_of(rows, is).and_then(|hours| finite(hours, 3));
+    let judged = count(|row| row.cloud_share.is_some());
+    let has_sun = rows.iter().any(|row| !row.twilight.is_empty());
     let is_dark = |row: &NightRow| row.twilight == "night";
     let mut dates = rows
         .iter()
+        .filter(|row| row.no_sky().is_none())
         .map(|row| &row.date)
         .filter(|date| !date.is_empty());
     let first_date = dates.next().cloned().unwrap_or_default();
@@ -89,14 +104,19 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
         last_date: dates.next_back().unwrap_or(&first_date).clone(),
         first_date,
         site: site.map(|site| [site.lat_deg(), site.lon_deg(), site.height_m()]),
-        frames: rows.len(),
+        frames: count(|row| row.no_sky().is_none()),
         identified: count(NightRow::is_identified),
         held: count(|row| row.pointing == "held"),
         unread: count(NightRow::is_unread),
+        passed_over: Vec::new(),
+        timed: count(|row| row.mjd.is_some()),
+        judged,
+        clear: count(is_clear),
         hours: hours(|_| true),
-        clear_hours: is_known.then(|| hours(is_clear)),
-        dark_hours: hours(is_dark),
-        clear_dark_hours: is_known.then(|| hours(|row| row.twilight == "night" && is_clear(row))),
+        clear_hours: hours(is_clear).filter(|_| judged > 0),
+        dark_hours: hours(is_dark).filter(|_| has_sun),
+        clear_dark_hours: hours(|row| row.twilight == "night" && is_clear(row))
+            .filter(|_| judged > 0 && has_sun),
         darkest_hour: darkest_hour(rows),
         median: Medians {
             zenith_mag_arcsec2: median_of(rows, |row| row.zenith_mag_arcsec2),
@@ -129,8 +149,9 @@ fn median_of(rows: &[NightRow], value: fn(&NightRow) -> Option<f64>) -> Option<f
         .and_then(|value| finite(value, 4))
 }
 
-/// Hours for which frames stand that are like this: each half of the way to its neighbors.
-fn hours_of(rows: &[NightRow], is: fn(&NightRow) -> bool) -> f64 {
+/// Hours for which frames stand that are like this: each half of the way to its neighbors. `None` where the frames
+/// have fewer than two times.
+fn hours_of(rows: &[NightRow], is: fn(&NightRow) -> bool) -> Option<f64> {
     let dated: Vec<(f64, bool)> = rows
         .iter()
         .filter_map(|row| Some((row.mjd?, is(row))))
@@ -139,7 +160,8 @@ fn hours_of(rows: &[NightRow], is: fn(&NightRow) -> bool) -> f64 {
         let gap_d = (pair[1].0 - pair[0].0).clamp(0.0, MAX_GAP_D);
         0.5 * gap_d * f64::from(u8::from(pair[0].1) + u8::from(pair[1].1))
     };
-    24.0 * dated.windows(2).map(half).sum::<f64>()
+    let has_two = dated.first()?.0 < dated.last()?.0;
+    has_two.then(|| 24.0 * dated.windows(2).map(half).sum::<f64>())
 }
 
 /// The hour, or what there is of it, in which the median of the zenith is darkest.
@@ -198,4 +220,44 @@ fn map(rows: &[NightRow]) -> Vec<MapCell> {
         })
     };
     middles.iter().enumerate().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Clear frames at these Modified Julian Dates, and one behind clouds.
+    fn summary(mjds: &[Option<f64>]) -> NightSummary {
+        let row = |(number, mjd): (usize, &Option<f64>)| NightRow {
+            mjd: *mjd,
+            cloud_share: Some(if number == 0 { 0.9 } else { 0.0 }),
+            ..NightRow::default()
+        };
+        let rows: Vec<NightRow> = mjds.iter().enumerate().map(row).collect();
+        summarize(&rows, None, &[])
+    }
+
+    #[test]
+    fn hours_are_known_where_two_times_are() {
+        let day = 61_055.0;
+        for unknown in [
+            &[][..],
+            &[None; 3],
+            &[Some(day)],
+            &[Some(day), Some(day), None],
+        ] {
+            let night = summary(unknown);
+            assert_eq!(
+                (night.hours, night.clear_hours),
+                (None, None),
+                "{unknown:?}"
+            );
+            assert_eq!(night.clear, unknown.len().saturating_sub(1));
+            assert_eq!(night.judged, unknown.len());
+        }
+        let night = summary(&[Some(day), None, Some(day + 0.01)]);
+        assert_eq!((night.hours, night.clear_hours), (Some(0.24), Some(0.12)));
+        // Without a site, nothing is known of twilight.
+        assert_eq!((night.dark_hours, night.timed), (None, 2));
+    }
 }

@@ -375,3 +375,74 @@ fn a_damaged_table_is_told() {
         assert!(!ran.stderr.contains("panicked"), "{at}: {}", ran.stderr);
     }
 }
+
+#[test]
+fn what_is_damaged_loses_only_itself() {
+    let night = night(7);
+    let night = night.path();
+    process(night, "out", &[]);
+    let whole = files(&night.join("out"));
+    let flip = |path: &Path, at: usize| {
+        let mut bytes = fs::read(path).unwrap();
+        bytes[at] ^= 1;
+        fs::write(path, bytes).unwrap();
+    };
+    let tables = |table: &str| {
+        let parts = fs::read_dir(night.join("out").join(table)).unwrap();
+        let mut parts: Vec<_> = parts.map(|entry| entry.unwrap().path()).collect();
+        parts.sort();
+        parts
+    };
+    flip(&tables("frames.parquet")[1], 200);
+    flip(&tables("stars.parquet")[2], 200);
+    let status = run(night, &["archive", "status", "out"]);
+    assert_eq!(status.status, 3);
+    assert!(
+        status.stdout.contains("damaged    parts 1-2"),
+        "{}",
+        status.stdout
+    );
+    let report = run(night, &["archive", "report", "out", "--format", "json"]);
+    assert_eq!(report.status, 1);
+    assert!(
+        report.stderr.contains("is damaged: it is left out"),
+        "{}",
+        report.stderr
+    );
+    assert!(!report.stdout.is_empty());
+    assert_eq!(
+        run(night, &["archive", "merge", "out", "--out", "merged"]).status,
+        1
+    );
+    let ran = process(night, "out", &[]);
+    assert!(
+        ran.stderr.contains("part 1 is damaged: it is done again"),
+        "{}",
+        ran.stderr
+    );
+    assert!(ran.stdout.starts_with("2 parts, "), "{}", ran.stdout);
+    assert!(files(&night.join("out")) == whole);
+
+    for name in ["archive.json", "inputs.txt"] {
+        flip(&night.join("out").join(name), 20);
+        let told = run(night, &["archive", "status", "out"]);
+        assert_eq!(told.status, 1);
+        assert!(
+            told.stderr.contains(&format!("{name} is damaged")),
+            "{}",
+            told.stderr
+        );
+        let ran = process(night, "out", &[]);
+        let mended = format!("{name} was damaged: it is written anew");
+        assert!(ran.stderr.contains(&mended), "{}", ran.stderr);
+        assert!(files(&night.join("out")) == whole);
+    }
+    flip(&night.join("out/archive.json"), 20);
+    let other = process(night, "out", &["--sigma", "7"]);
+    assert_eq!(other.status, 2);
+    assert!(
+        other.stderr.contains("archive.json is damaged"),
+        "{}",
+        other.stderr
+    );
+}

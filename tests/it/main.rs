@@ -22,6 +22,7 @@ mod diagnosis;
 mod experiment;
 mod faults;
 mod fixtures;
+mod folders;
 mod frames;
 mod fuzz_replay;
 mod identify;

@@ -195,6 +195,35 @@ fn a_night_tells_clouds_and_the_knock_and_goes_on_where_it_stopped() {
     assert_eq!(night(&out, &["--threads=1"]).status, 0);
     assert!(contents(&out) == whole);
 
+    // A byte of the sixth row flipped, two rows exchanged, and a state file that is not JSON any longer.
+    let mut lines: Vec<Vec<u8>> = text
+        .split_inclusive(|b| *b == b'\n')
+        .map(<[u8]>::to_vec)
+        .collect();
+    lines[5][100] ^= 1;
+    lines.swap(8, 9);
+    fs::write(&journal, lines.concat()).unwrap();
+    fs::write(out.join("night-run.json"), "{").unwrap();
+    let mended = night(&out, &[]);
+    assert_eq!(mended.status, 0);
+    for told in [
+        "night.jsonl: 1 line damaged, whose frames are done again: 6\n",
+        "night-run.json was damaged",
+    ] {
+        assert!(mended.stderr.contains(told), "{}", mended.stderr);
+    }
+    assert!(contents(&out) == whole);
+    // Whose rows these are, nothing tells.
+    fs::write(out.join("night-run.json"), "{").unwrap();
+    let refused = night(&out, &["--exposure=10"]);
+    assert_eq!(refused.status, 2);
+    assert!(
+        refused.stderr.contains("night-run.json is damaged"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(night(&out, &[]).status, 0);
+
     let refused = night(&out, &["--exposure=10"]);
     assert_eq!(refused.status, 2);
     assert!(

@@ -6,12 +6,13 @@ mod page;
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
 use super::output::files::{make_directory, write_whole};
+use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
 use nights::{NightLine, nights_text};
 use starpipe::archive::{Archive, Status, merge, status, summary};
-use starpipe::base::format::printable;
+use starpipe::base::format::{printable, ranges};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -28,7 +29,7 @@ pub(crate) struct ArchiveArgs {
 
 #[derive(Debug, Subcommand)]
 enum ArchiveCommand {
-    /// Show what is done, failed and missing; the exit status is 3 if parts are missing
+    /// Show what is done, failed and missing; the exit status is 3 if parts are missing or damaged
     #[command(after_help = "Example:\n  starpipe archive status results")]
     Status(StatusArgs),
     /// Merge the parts of each table into one file, sorted by frame name
@@ -109,8 +110,15 @@ fn status_text(status: &Status) -> String {
         status.not_identified,
         status.unread.len()
     );
-    if !status.is_complete() {
+    if !status.missing_parts.is_empty() {
         let _ = writeln!(text, "missing    parts {}", ranges(&status.missing_parts));
+    }
+    if !status.damaged_parts.is_empty() {
+        let parts = ranges(&status.damaged_parts);
+        let _ = writeln!(
+            text,
+            "damaged    parts {parts}, which the same command of `process` does again"
+        );
     }
     for unread in status.unread.iter().take(UNREAD_SHOWN) {
         let (frame, reason) = (printable(&unread.frame), printable(&unread.reason));
@@ -121,16 +129,6 @@ fn status_text(status: &Status) -> String {
         let _ = writeln!(text, "unread     {more} more, which --format csv lists");
     }
     text
-}
-
-/// Ascending numbers as `0-4 7`.
-fn ranges(numbers: &[usize]) -> String {
-    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
-    let texts = runs.map(|run| match run {
-        [first, .., last] => format!("{first}-{last}"),
-        _ => run.iter().map(usize::to_string).collect(),
-    });
-    texts.collect::<Vec<_>>().join(" ")
 }
 
 fn merge_tables(arguments: &MergeArgs) -> Result<Outcome, CommandError> {
@@ -145,14 +143,27 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
     let archive = Archive::open(&arguments.directory)?;
     let default = || arguments.directory.join("report.html");
     let page_path = arguments.html.checked_path(&[], default)?;
+    let damaged = archive.damaged_frames();
+    for path in &damaged {
+        report_warning(format_args!(
+            "{} is damaged: it is left out",
+            path.display()
+        ));
+    }
     let nights = summary(&archive)?;
     if let Some(path) = &page_path {
         let page = page::of(&archive, &nights)?;
         write_whole(&[super::page::file(path, &page)?])?;
     }
-    Ok(Outcome::success(match arguments.format {
+    let text = match arguments.format {
         Format::Text => nights_text(&nights),
         Format::Json => json_lines(nights.iter())?,
         Format::Csv => csv_table(nights.iter().map(NightLine::of))?,
-    }))
+    };
+    let exit = if damaged.is_empty() {
+        Exit::Success
+    } else {
+        Exit::Failure
+    };
+    Ok(Outcome { text, exit })
 }

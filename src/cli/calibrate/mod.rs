@@ -21,7 +21,7 @@ use super::progress::frames_bar;
 use super::solving::{Inputs, Plan, Sink, Solved, Solver};
 use clap::Args;
 use exports::ExportOptions;
-use starpipe::frame::{ImageName, PageChoice};
+use starpipe::frame::{Cameras, ImageName, PageChoice};
 use starpipe::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
 use starpipe::report::LensReport;
 use starpipe::report::page::Fact;
@@ -74,7 +74,8 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandErro
         lens_file::check(files.chain(arguments.page_path().as_deref()))?;
     }
     let plan = arguments.plan()?;
-    let (paths, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
+    let (paths, failed) =
+        FrameList::of_sky(arguments.frames.frames.clone(), Cameras::One)?.reported();
     if arguments.force {
         arguments
             .html

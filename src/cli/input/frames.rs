@@ -3,11 +3,12 @@
 use super::stdin::{check_once, is_stdin};
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
+use crate::cli::input::names::report_passed_over;
 use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
 use anyhow::Context;
 use starpipe::calibration::Master;
-use starpipe::frame::{self, Buffers, Frame, FrameError};
+use starpipe::frame::{self, Buffers, Cameras, Folder, Frame, FrameError, PassedOver};
 use starpipe::pipeline;
 use std::io;
 use std::num::NonZeroUsize;
@@ -19,31 +20,56 @@ pub(crate) struct FrameList {
     pub(crate) paths: Vec<PathBuf>,
     /// One for each directory that could not be read or has no frames.
     pub(crate) errors: Vec<pipeline::Error>,
+    /// What is no frame of the sky in the directories.
+    pub(crate) passed_over: Vec<PassedOver>,
 }
 
 impl FrameList {
-    /// Replaces each directory by the frames in it.
+    /// Replaces each directory by the frames in it, whatever they are of.
     pub(crate) fn of(inputs: Vec<PathBuf>) -> Result<Self, CommandError> {
+        Self::with(inputs, |directory| {
+            let frames = frame::files_in(directory)?;
+            Ok(Folder {
+                frames,
+                ..Folder::default()
+            })
+        })
+    }
+
+    /// Replaces each directory by the frames of the sky in it.
+    pub(crate) fn of_sky(inputs: Vec<PathBuf>, cameras: Cameras) -> Result<Self, CommandError> {
+        Self::with(inputs, |directory| Folder::of(directory, cameras))
+    }
+
+    fn with(
+        inputs: Vec<PathBuf>,
+        list: impl Fn(&Path) -> Result<Folder, FrameError>,
+    ) -> Result<Self, CommandError> {
         check_once(&inputs)?;
-        let mut list = Self {
+        let mut all = Self {
             paths: Vec::new(),
             errors: Vec::new(),
+            passed_over: Vec::new(),
         };
         for input in inputs {
             if !input.is_dir() {
-                list.paths.push(input);
+                all.paths.push(input);
                 continue;
             }
-            match frame::files_in(&input) {
-                Ok(found) => list.paths.extend(found),
-                Err(error) => list.errors.push(error.into()),
+            match list(&input) {
+                Ok(found) => {
+                    all.paths.extend(found.frames);
+                    all.passed_over.extend(found.passed_over);
+                }
+                Err(error) => all.errors.push(error.into()),
             }
         }
-        Ok(list)
+        Ok(all)
     }
 
-    /// The frames, and whether a directory failed; the errors are reported.
+    /// The frames, and whether a directory failed; the errors, and what is passed over, are reported.
     pub(crate) fn reported(self) -> (Vec<PathBuf>, bool) {
+        report_passed_over(&self.passed_over);
         for error in &self.errors {
             report_error(error);
         }

@@ -1,10 +1,13 @@
 //! Names of many frames: directories, patterns, lists.
 
 use super::stdin::is_stdin;
+use crate::cli::output::messages::report;
 use anyhow::{Context, anyhow, bail};
 use starpipe::archive::names_in;
 use starpipe::base::files;
-use starpipe::frame;
+use starpipe::base::format::counted_as;
+use starpipe::frame::{Cameras, Folder, OtherFile, PassedOver};
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -15,9 +18,21 @@ const MAX_BYTES: u64 = 1 << 30;
 const LISTS: [&str; 2] = ["txt", "lst"];
 
 /// The frames that `inputs` name: frames themselves, directories of them, patterns such as
-/// `night/**/*.fits`, lists, and `-` for a list on standard input.
-pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
+/// `night/**/*.fits`, lists, and `-` for a list on standard input; and what is no frame of the sky in directories
+/// and patterns, which is told.
+pub(crate) fn frame_names(
+    inputs: &[PathBuf],
+    cameras: Cameras,
+) -> anyhow::Result<(Vec<String>, Vec<PassedOver>)> {
     let mut names = Vec::new();
+    let mut passed_over = Vec::new();
+    let mut add = |folder: Folder, names: &mut Vec<String>| {
+        passed_over.extend(folder.passed_over);
+        for path in &folder.frames {
+            names.push(name_of(path)?);
+        }
+        anyhow::Ok(())
+    };
     for input in inputs {
         if is_stdin(input) {
             let bytes = files::read_stream(io::stdin().lock(), MAX_BYTES);
@@ -25,9 +40,9 @@ pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
             let text = text.context("reading a list of frames from standard input")?;
             add_lines(&text, &mut names);
         } else if input.is_dir() {
-            for path in frame::files_in(input)? {
-                names.push(name_of(&path)?);
-            }
+            add(Folder::of(input, cameras)?, &mut names)?;
+        } else if is_pattern(input) {
+            add(Folder::sorted(matching(input)?, cameras), &mut names)?;
         } else {
             add_file(input, &mut names)?;
         }
@@ -35,7 +50,34 @@ pub(crate) fn frame_names(inputs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     if let Some(name) = names.iter().find(|name| name.contains('\n')) {
         bail!("a line break in the name {name:?}: such a frame cannot be listed");
     }
-    Ok(names)
+    report_passed_over(&passed_over);
+    Ok((names, passed_over))
+}
+
+/// The files that match a pattern.
+fn matching(pattern: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let reading = || format!("reading the list of frames {}", pattern.display());
+    let found = glob::glob(&name_of(pattern)?).with_context(reading)?;
+    found
+        .filter(|path| !path.as_ref().is_ok_and(|path| path.is_dir()))
+        .map(|path| path.with_context(reading))
+        .collect()
+}
+
+/// Tells how many files of each kind are no frames of the sky, and the first of each.
+pub(crate) fn report_passed_over(files: &[PassedOver]) {
+    let mut by_kind: BTreeMap<OtherFile, Vec<&Path>> = BTreeMap::new();
+    for file in files {
+        by_kind.entry(file.kind).or_default().push(&file.path);
+    }
+    for (kind, paths) in by_kind {
+        let others = if paths.len() > 1 { " and others" } else { "" };
+        let count = counted_as(paths.len(), kind.text());
+        report(format_args!(
+            "passed over {count}: {}{others}",
+            paths[0].display()
+        ));
+    }
 }
 
 fn add_file(input: &Path, names: &mut Vec<String>) -> anyhow::Result<()> {
@@ -48,11 +90,6 @@ fn add_file(input: &Path, names: &mut Vec<String>) -> anyhow::Result<()> {
                 &files::read_text(input, MAX_BYTES).with_context(reading)?,
                 names,
             );
-        }
-        _ if is_pattern(input) => {
-            for path in glob::glob(&name_of(input)?).with_context(reading)? {
-                names.push(name_of(&path.with_context(reading)?)?);
-            }
         }
         _ => names.push(name_of(input)?),
     }

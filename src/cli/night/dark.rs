@@ -2,7 +2,8 @@
 
 use super::read::of_each;
 use super::run::Run;
-use starpipe::night::{FrameLevel, NightStart, dark_level};
+use starpipe::frame::Frame;
+use starpipe::night::{FrameLevel, NightStart, dark_level, is_by_day};
 use starpipe::photometry::sky_map::DarkLevel;
 
 /// The level by frames of different exposure, where nothing else tells it.
@@ -10,7 +11,11 @@ pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<D
     if !start.lacks_dark_level {
         return None;
     }
-    let level = |_: &_, frame| FrameLevel::of(&frame);
+    // By day, light is not as exposures are.
+    let level = |_: &_, frame: Frame<'static>| {
+        let is_dark = !is_by_day(frame.metadata.date.as_ref(), start.site);
+        is_dark.then(|| FrameLevel::of(&frame))?
+    };
     let levels = of_each(names, run.pool, run.plan.memory, level);
     let levels: Vec<FrameLevel> = levels.into_iter().flatten().collect();
     dark_level(&levels)

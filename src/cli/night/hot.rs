@@ -3,7 +3,7 @@
 use super::read::of_each;
 use super::run::Run;
 use crate::cli::output::rows::csv_table;
-use starpipe::night::{NightHotPixel, NightStart, Standouts, hot_pixels, probe_order};
+use starpipe::night::{NightHotPixel, NightStart, Standouts, hot_pixels, is_by_day, probe_order};
 
 /// Frames that are looked at.
 const FRAMES: usize = 12;
@@ -14,6 +14,9 @@ pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<V
     let chosen: Vec<&String> = order.iter().take(FRAMES).map(|at| &names[*at]).collect();
     let standouts = of_each(&chosen, run.pool, run.plan.memory, |_, frame| {
         let date = frame.metadata.date;
+        if is_by_day(date.as_ref(), start.site) {
+            return None;
+        }
         let mjd = date.and_then(|date| date.modified_julian_date());
         Some(Standouts::of(&frame.into_stored(), mjd))
     });

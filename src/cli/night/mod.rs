@@ -6,6 +6,7 @@ mod files;
 mod hot;
 mod order;
 mod page;
+mod passed_over;
 mod read;
 mod run;
 mod text;
@@ -16,25 +17,30 @@ use super::exit::{CommandError, Exit, Outcome};
 use super::input::names::frame_names;
 use super::options::format::PageFormat;
 use super::output::files::{make_directory, write_whole};
-use super::output::journal::Journal;
+use super::output::journal::{Journal, has_row_of};
+use super::output::messages::report_mended;
 use super::output::rows::json_line;
 use super::solving::Plan;
 use run::{BATCH, Measured, Run};
 use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
+use starpipe::frame::Cameras;
 use starpipe::lens::MEASURED_BY;
-use starpipe::night::{SkyglowStation, summarize};
+use starpipe::night::{PassedOverFiles, SkyglowStation, summarize};
 use starpipe::sky::catalog::Catalog;
+use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
 /// `starpipe night`
 pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
     let plan = arguments.plan()?;
-    let names = frame_names(&arguments.frames)?;
+    let (names, mut passed_over) = frame_names(&arguments.frames, Cameras::OneNight)?;
+    passed_over.retain(|file| !is_own_result(&arguments.out, &file.path));
     arguments.catalog.with_index(|pool, indexed| {
         let names = order::by_date(names, pool, plan.memory);
-        claim(arguments, &plan, &names, indexed.catalog())?;
-        let (journal, rows) = Journal::open(&arguments.out.join(files::ROWS), &names, BATCH)?;
+        let owner = claim(arguments, &plan, &names, indexed.catalog())?;
+        let (journal, kept) =
+            Journal::open(&arguments.out.join(files::ROWS), owner.text(), &names)?;
         let run = Run {
             pool,
             plan: &plan,
@@ -59,18 +65,36 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
             _ => None,
         };
         let run = run.with_calibration(masked.as_ref());
-        let measured = run.measure(&names, start, journal, rows)?;
-        finish(arguments, &measured, hot.map(|pixels| pixels.len()))
+        let measured = run.measure(&names, start, journal, kept)?;
+        let beside = Beside {
+            hot_pixels: hot.map(|pixels| pixels.len()),
+            passed_over: passed_over::counts(&passed_over, &measured.rows),
+        };
+        finish(arguments, &measured, beside)
     })
 }
 
-/// Takes the directory for this run, or goes on in it.
+/// What is told of a night besides its rows.
+struct Beside {
+    hot_pixels: Option<usize>,
+    passed_over: Vec<PassedOverFiles>,
+}
+
+/// Whether a file is a result of an earlier run of the same night.
+fn is_own_result(out: &Path, path: &Path) -> bool {
+    let names = files::NAMES.into_iter().chain([files::RUN]);
+    names
+        .map(|name| out.join(name))
+        .any(|result| result == path)
+}
+
+/// Takes the directory for this run, or goes on in it. Returns whose it is.
 fn claim(
     arguments: &NightArgs,
     plan: &Plan,
     names: &[String],
     catalog: &Catalog,
-) -> Result<(), CommandError> {
+) -> Result<Identity, CommandError> {
     let directory = &arguments.out;
     make_directory(directory)?;
     let is_foreign =
@@ -84,12 +108,22 @@ fn claim(
     }
     let frames = archive::Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
     let identity = Identity::new(&frames, &configuration(arguments, plan, catalog)?)?;
-    archive::claim_file(directory, files::RUN, &identity).map_err(|error| match error {
-        ArchiveError::OtherRun { .. } => {
+    let is_own = || is_own(directory, &identity);
+    let is_mended = archive::claim_file(directory, files::RUN, &identity, is_own);
+    let is_mended = is_mended.map_err(|error| match error {
+        ArchiveError::OtherRun { .. } | ArchiveError::Damaged { .. } => {
             CommandError::usage(format_args!("{error}; choose another directory for --out"))
         }
         other => other.into(),
-    })
+    })?;
+    report_mended(is_mended.then(|| directory.join(files::RUN)).as_slice());
+    Ok(identity)
+}
+
+/// Whether the rows in the directory, if there are any, are of the run.
+fn is_own(directory: &Path, identity: &Identity) -> bool {
+    let rows = fs::read(directory.join(files::ROWS)).unwrap_or_default();
+    rows.is_empty() || has_row_of(&rows, identity.text())
 }
 
 /// All that the rows depend on.
@@ -113,7 +147,7 @@ fn configuration(
 fn finish(
     arguments: &NightArgs,
     measured: &Measured,
-    hot_pixels: Option<usize>,
+    beside: Beside,
 ) -> Result<Outcome, CommandError> {
     let Measured {
         rows,
@@ -121,7 +155,8 @@ fn finish(
         start,
     } = measured;
     let mut night = summarize(rows, start.site, history.knocks());
-    night.hot_pixels = hot_pixels;
+    night.hot_pixels = beside.hot_pixels;
+    night.passed_over = beside.passed_over;
     night.site_or_time.clone_from(&start.site_or_time);
     let station = SkyglowStation {
         instrument: arguments.station.instrument.clone(),

@@ -21,12 +21,12 @@ pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow
     }
     tables.push(table("Frames", csv)?);
     Ok(Page {
-        title: format!("Night of {}", summary.first_date),
-        question: "How was the night?".to_owned(),
-        answer: match summary.clear_hours {
-            Some(clear) => format!("{clear:.1} of {:.1} hours were clear.", summary.hours),
-            None => "No frame tells of clouds.".to_owned(),
+        title: match summary.first_date.as_str() {
+            "" => "A night".to_owned(),
+            date => format!("Night of {date}"),
         },
+        question: "How was the night?".to_owned(),
+        answer: text::answer(summary),
         facts: text::medians(summary)
             .map(|median| Fact::new(format!("Median {}", median.name), median.value))
             .collect(),

@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use starpipe::UtcOffset;
 use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
-use starpipe::night::{NightRow, NightStart, PointingHistory, Probe, probe_order};
+use starpipe::night::{NightRow, NightStart, NoSky, PointingHistory, Probe, probe_order};
 use starpipe::pipeline::{Context, HeldCamera};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -46,13 +46,13 @@ impl<'a> Run<'a> {
         Self { context, ..self }
     }
 
-    /// Measures the frames `names`, in their order, going on after the rows in `journal`.
+    /// Measures the frames `names`, in their order, but those whose rows are in `journal`: `kept`.
     pub(super) fn measure(
         &self,
         names: &[String],
         start: NightStart,
         mut journal: Journal,
-        rows: Vec<NightRow>,
+        mut kept: Vec<Option<NightRow>>,
     ) -> Result<Measured, CommandError> {
         let progress = self.bar(names.len());
         let mut measured = Measured {
@@ -60,18 +60,24 @@ impl<'a> Run<'a> {
             rows: Vec::with_capacity(names.len()),
             start,
         };
-        for row in rows {
-            measured.take(row);
-        }
-        progress.inc(measured.rows.len() as u64);
-        while measured.rows.len() < names.len() {
+        for (batch, kept) in names.chunks(BATCH).zip(kept.chunks_mut(BATCH)) {
+            let is_lost: Vec<bool> = kept.iter().map(Option::is_none).collect();
+            let lost = batch.iter().zip(&is_lost);
+            let lost: Vec<&String> = lost
+                .filter_map(|(name, lost)| lost.then_some(name))
+                .collect();
+            progress.inc((batch.len() - lost.len()) as u64);
+            let mut made = self.batch(&lost, &measured, &progress).into_iter();
             let done = measured.rows.len();
-            let batch = &names[done..(done + BATCH).min(names.len())];
-            for row in self.batch(batch, &measured, &progress) {
-                measured.take(row);
+            for row in kept.iter_mut() {
+                if let Some(row) = row.take().or_else(|| made.next()) {
+                    measured.take(row);
+                }
             }
-            journal.add(&measured.rows[done..])?;
+            let rows = measured.rows[done..].iter().zip(&is_lost);
+            journal.add(rows.filter_map(|(row, lost)| lost.then_some(row)))?;
         }
+        journal.finish::<NightRow>()?;
         progress.finish_and_clear();
         Ok(measured)
     }
@@ -111,7 +117,7 @@ impl<'a> Run<'a> {
     /// The rows of a batch.
     fn batch(
         &self,
-        names: &[String],
+        names: &[&String],
         measured: &Measured,
         progress: &ProgressBar,
     ) -> Vec<NightRow> {
@@ -191,6 +197,11 @@ impl Sink for Rows {
     type Made = NightRow;
 
     fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
-        NightRow::of(&image.to_string(), &solved.solution, self.clear_ground_vmag)
+        let (name, solution) = (image.to_string(), &solved.solution);
+        let frame = solved.frame.as_ref();
+        match frame.and_then(|frame| NoSky::of(&image.to_path(), solution, frame)) {
+            Some(kind) => NightRow::passed_over(&name, solution, kind),
+            None => NightRow::of(&name, solution, self.clear_ground_vmag),
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! A night for people.
 
-use starpipe::base::format::counted;
-use starpipe::night::NightSummary;
+use starpipe::base::format::{counted, counted_as};
+use starpipe::frame::OtherFile;
+use starpipe::night::{NightSummary, NoSky, PassedOverFiles};
 use std::fmt::Write as _;
 
 /// The summary as text.
@@ -15,17 +16,11 @@ pub(super) fn text(night: &NightSummary) -> String {
         night.held,
         night.unread
     );
-    let clear = |hours: Option<f64>| {
-        hours.map_or(String::new(), |hours| format!(", {hours:.2} of them clear"))
-    };
-    let _ = writeln!(
-        text,
-        "hours      {:.2}{}; {:.2} without twilight{}",
-        night.hours,
-        clear(night.clear_hours),
-        night.dark_hours,
-        clear(night.clear_dark_hours)
-    );
+    if !night.passed_over.is_empty() {
+        let counts: Vec<String> = night.passed_over.iter().map(passed_over).collect();
+        let _ = writeln!(text, "passed     over: {}", counts.join(", "));
+    }
+    let _ = writeln!(text, "hours      {}", hours(night));
     if let Some(hour) = &night.darkest_hour {
         let _ = writeln!(
             text,
@@ -52,6 +47,72 @@ pub(super) fn text(night: &NightSummary) -> String {
         let _ = writeln!(text, "{:<10} {}", time_of(&moment.date), moment.to_text());
     }
     text
+}
+
+/// Files of one kind with their count.
+fn passed_over(files: &PassedOverFiles) -> String {
+    let kinds = [
+        OtherFile::of_code(&files.kind).map(OtherFile::text),
+        NoSky::of_code(&files.kind).map(NoSky::text),
+    ];
+    let text = kinds.into_iter().flatten().next();
+    counted_as(files.count, text.unwrap_or(["other file", "other files"]))
+}
+
+/// How long there were frames, and how long the sky was clear; their number where times do not tell.
+fn hours(night: &NightSummary) -> String {
+    let Some(hours) = night.hours else {
+        return format!("{}; {}", unknown_hours(night), clear_frames(night));
+    };
+    let clear = |hours: Option<f64>| {
+        hours.map_or(String::new(), |hours| format!(", {hours:.2} of them clear"))
+    };
+    let mut text = format!("{hours:.2}{}", clear(night.clear_hours));
+    if let Some(dark) = night.dark_hours {
+        text += &format!(
+            "; {dark:.2} without twilight{}",
+            clear(night.clear_dark_hours)
+        );
+    }
+    if night.timed < night.frames {
+        text += &format!(
+            "; by {} of {} frames, which have a time",
+            night.timed, night.frames
+        );
+    }
+    text
+}
+
+/// Why no hours are known.
+fn unknown_hours(night: &NightSummary) -> &'static str {
+    match night.timed {
+        0 => "not known, as no frame has a time",
+        1 => "not known, as one frame alone has a time",
+        _ => "not known, as all frames have the same time",
+    }
+}
+
+fn clear_frames(night: &NightSummary) -> String {
+    match night.judged {
+        0 => "no frame tells of clouds".to_owned(),
+        judged => format!("{} of {} clear", night.clear, counted(judged, "frame")),
+    }
+}
+
+/// How much of the night was clear, in a sentence.
+pub(super) fn answer(night: &NightSummary) -> String {
+    match (night.hours, night.clear_hours) {
+        (Some(hours), Some(clear)) => format!("{clear:.1} of {hours:.1} hours were clear."),
+        (None, _) if night.judged > 0 => {
+            let frames = counted(night.judged, "frame");
+            format!(
+                "Clear: {} of {frames}. Hours are {}.",
+                night.clear,
+                unknown_hours(night)
+            )
+        }
+        _ => "No frame tells of clouds.".to_owned(),
+    }
 }
 
 /// The median of a series, as it is shown.

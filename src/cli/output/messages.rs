@@ -5,6 +5,7 @@ use starpipe::base::remedy::OptionNames;
 use starpipe::pipeline::remedies_of;
 use std::fmt::Display;
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 /// Reports an error with its causes.
 pub(crate) fn report_error(error: &(dyn std::error::Error + 'static)) {
@@ -15,6 +16,16 @@ pub(crate) fn report_error(error: &(dyn std::error::Error + 'static)) {
 /// Reports something unexpected that leaves the results valid.
 pub(crate) fn report_warning(message: impl Display) {
     report(format_args!("warning: {message}"));
+}
+
+/// Tells of files that say whose a directory is, and that were damaged.
+pub(crate) fn report_mended(files: &[PathBuf]) {
+    for path in files {
+        report_warning(format_args!(
+            "{} was damaged: it is written anew",
+            path.display()
+        ));
+    }
 }
 
 /// Writes one line to standard error.

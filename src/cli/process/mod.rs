@@ -9,6 +9,7 @@ use super::exit::{CommandError, Exit, Outcome};
 use super::input::frames::FrameList;
 use super::solving::{Inputs, report_all};
 use parts::process_parts;
+use starpipe::frame::Cameras;
 
 /// `starpipe process`
 pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
@@ -17,7 +18,7 @@ pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
     }
     let plan = arguments.plan()?;
     let inputs = Inputs::Frames(arguments.page.unwrap_or_default());
-    let (frames, failed) = FrameList::of(arguments.frames.frames)?.reported();
+    let (frames, failed) = FrameList::of_sky(arguments.frames.frames, Cameras::Any)?.reported();
     let exit = report_all(&inputs, &frames, arguments.solving, &plan)?;
     Ok(if failed { Exit::Failure } else { exit }.into())
 }

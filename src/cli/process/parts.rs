@@ -3,13 +3,15 @@
 use super::args::ProcessArgs;
 use crate::cli::exit::{CommandError, Outcome, Tally};
 use crate::cli::input::names::frame_names;
-use crate::cli::output::messages::{one_line, report_error};
+use crate::cli::output::messages::{one_line, report_error, report_mended, report_warning};
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{Inputs, Sink, Solved, Solver};
 use indicatif::ProgressBar;
-use starpipe::archive::{Archive, ArchiveError, Configuration, FrameRow, Part, Plan, Shard};
+use starpipe::archive::{
+    Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
+};
 use starpipe::base::format::counted;
-use starpipe::frame::{ImageName, PageChoice};
+use starpipe::frame::{Cameras, ImageName, PageChoice};
 use starpipe::report::{FrameReport, StarRow};
 use starpipe::sky::catalog::Catalog;
 use std::ops::ControlFlow;
@@ -22,7 +24,7 @@ pub(super) fn process_parts(
 ) -> Result<Outcome, CommandError> {
     let options = &arguments.parts;
     let solving = arguments.plan()?;
-    let names = frame_names(&arguments.frames.frames)?;
+    let (names, _) = frame_names(&arguments.frames.frames, Cameras::Any)?;
     let plan = Plan::new(names, options.frames_per_part)?;
     let inputs = Inputs::Frames(arguments.page.unwrap_or_default());
     arguments.solving.catalog.with_index(|pool, indexed| {
@@ -35,6 +37,7 @@ pub(super) fn process_parts(
             ..calibration.configuration(indexed.catalog(), &solving.options, hints)?
         };
         let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
+        report_mended(archive.mended());
         let worker = Worker(Solver {
             pool,
             inputs: &inputs,
@@ -52,9 +55,11 @@ pub(super) fn process_parts(
 /// A directory that holds something else is an error of the command line.
 fn claim_error(error: ArchiveError) -> CommandError {
     match error {
-        ArchiveError::OtherRun { .. } | ArchiveError::Foreign { .. } => CommandError::Usage(
-            format!("{error}; choose another directory for --out-parquet"),
-        ),
+        ArchiveError::OtherRun { .. }
+        | ArchiveError::Foreign { .. }
+        | ArchiveError::Damaged { .. } => CommandError::Usage(format!(
+            "{error}; choose another directory for --out-parquet"
+        )),
         other => CommandError::Failed(other.into()),
     }
 }
@@ -89,11 +94,19 @@ impl Worker<'_> {
         let progress = frames_bar(frames as u64);
         let mut counts = Counts::default();
         for part in parts {
-            if archive.has(part) {
-                counts.skipped += 1;
-                progress.inc(part.names.len() as u64);
-                progress.reset_eta();
-                continue;
+            match archive.state(part) {
+                PartState::Missing => {}
+                PartState::Damaged => {
+                    let number = part.number;
+                    let text = format!("part {number} is damaged: it is done again");
+                    progress.suspend(|| report_warning(text));
+                }
+                PartState::Whole => {
+                    counts.skipped += 1;
+                    progress.inc(part.names.len() as u64);
+                    progress.reset_eta();
+                    continue;
+                }
             }
             self.write_part(archive, part, &progress, &mut counts)?;
             counts.parts += 1;

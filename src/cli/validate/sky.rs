@@ -49,17 +49,21 @@ pub(super) fn run(
     let numbers: Vec<String> = (0..shared.frames)
         .map(|number| number.to_string())
         .collect();
-    let (mut journal, mut trials) = Journal::open::<SkyTrial>(&directory.join(ROWS), &numbers, 1)?;
-    shared.progress.inc(trials.len() as u64);
+    let (mut journal, mut trials) =
+        Journal::open::<SkyTrial>(&directory.join(ROWS), ROWS, &numbers)?;
+    let left: Vec<u64> = (0..shared.frames)
+        .zip(&trials)
+        .filter_map(|(number, made)| made.is_none().then_some(number))
+        .collect();
+    shared.progress.inc(shared.frames - left.len() as u64);
     shared.progress.reset_eta();
-    let left: Vec<u64> = (trials.len() as u64..shared.frames).collect();
     let work = |number: &u64, workspace: &mut Workspace| study.run_one(*number, workspace);
     let mut failed = Ok(());
-    for_each_ordered(shared.pool, &left, Workspace::new, work, |_, made| {
+    for_each_ordered(shared.pool, &left, Workspace::new, work, |number, made| {
         shared.progress.inc(1);
         let added = made.map_err(anyhow::Error::from).and_then(|trial| {
-            journal.add(std::slice::from_ref(&trial))?;
-            trials.push(trial);
+            journal.add([&trial])?;
+            trials[*number as usize] = Some(trial);
             Ok(())
         });
         match added {
@@ -71,6 +75,8 @@ pub(super) fn run(
         }
     });
     failed?;
+    journal.finish::<SkyTrial>()?;
+    let trials: Vec<SkyTrial> = trials.into_iter().flatten().collect();
     let summary = SkySummary::of(&trials);
     save(directory, &trials, &summary, shared)?;
     Ok((summary, trials))
