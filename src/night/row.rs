@@ -147,7 +147,9 @@ impl NightRow {
         }
         row.set_limits(solution);
         if let Some(sky) = &solution.sky {
-            row.set_sky(sky, clear_ground_vmag);
+            // Else a longer exposure cannot be told from clearer air.
+            let clearest = clear_ground_vmag.filter(|_| solution.exposure_s.is_some());
+            row.set_sky(sky, clearest);
         }
         row
     }

@@ -27,6 +27,7 @@ pub struct Probe {
     sigma_rad: f64,
     spot_sigma_px: Option<f64>,
     clear_sky: Option<ClearSky>,
+    has_exposure: bool,
     has_dark_level: bool,
     site: Option<Site>,
     /// What its local time is ahead of UTC, by the stars.
@@ -50,6 +51,7 @@ impl Probe {
             sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
             spot_sigma_px: solution.spot_sigma_px,
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
+            has_exposure: solution.exposure_s.is_some(),
             has_dark_level: solution.sky.as_ref().is_none_or(|sky| sky.dark.is_some()),
             site: solution.site,
             ahead: match solution.date.map(|known| known.zone) {
@@ -76,7 +78,7 @@ pub struct NightStart {
     pub lens: Option<Arc<KnownLens>>,
     /// How the camera stands, and its clear sky.
     pub held: Option<HeldCamera>,
-    /// Zero point through one airmass in the clearest of the frames, in V.
+    /// Zero point through one airmass in the clearest of the frames whose exposure is known, in V.
     pub clear_ground_vmag: Option<f64>,
     /// Whether frames do not tell the level of a pixel without light.
     pub lacks_dark_level: bool,
@@ -91,8 +93,12 @@ pub struct NightStart {
 impl NightStart {
     /// What `probes` tell; `known` is the lens that was measured before.
     pub fn of(probes: Vec<Probe>, known: Option<Arc<KnownLens>>) -> Self {
-        let skies = probes.iter().filter_map(|probe| probe.clear_sky);
-        let clear_sky = skies.max_by(|a, b| a.ground_vmag().total_cmp(&b.ground_vmag()));
+        let clearest = |is: fn(&&Probe) -> bool| {
+            let skies = probes.iter().filter(is).filter_map(|probe| probe.clear_sky);
+            skies.max_by(|a, b| a.ground_vmag().total_cmp(&b.ground_vmag()))
+        };
+        let clear_sky = clearest(|_| true);
+        let exposed_sky = clearest(|probe| probe.has_exposure);
         let spots_px = probes.iter().filter_map(|probe| probe.spot_sigma_px);
         let mut spots_px: Vec<f64> = spots_px.collect();
         let spot_sigma_px = (!spots_px.is_empty()).then(|| median(&mut spots_px));
@@ -122,7 +128,7 @@ impl NightStart {
             lens,
             lacks_dark_level: lacks_dark_level && held.is_some(),
             held,
-            clear_ground_vmag: clear_sky.map(|sky| sky.ground_vmag()),
+            clear_ground_vmag: exposed_sky.map(|sky| sky.ground_vmag()),
             site,
             ahead,
             site_or_time,
