@@ -8,7 +8,6 @@ use super::almanac::is_by_day;
 use crate::base::epoch::ObservationDate;
 use crate::base::statistics::median;
 use crate::frame::{Frame, Pixels};
-use crate::identify::DateSource;
 use crate::pipeline::{Outcome, Solution};
 use std::path::Path;
 
@@ -86,9 +85,7 @@ fn shows_day(name: &Path, solution: &Solution, frame: &Frame, light: &Light) -> 
         return false;
     };
     match solution.site {
-        Some(site) if known.source != DateSource::FileName => {
-            is_by_day(Some(&known.date), Some(site))
-        }
+        Some(site) if known.is_utc() => is_by_day(Some(&known.date), Some(site)),
         _ => hour_of(&known.date).is_some_and(|hour| HOURS.contains(&hour)),
     }
 }

@@ -44,8 +44,8 @@ fn tables_do_not_depend_on_workers_or_threads_and_a_rerun_skips_what_is_there() 
         process(night, "shards", &["--shard", worker, "--threads", "1"]);
     }
     let expected = files(&night.join("whole"));
-    // Two tables of three parts, the list of inputs, and whose it is.
-    assert_eq!(expected.len(), 8);
+    // Two tables of three parts and their checksums, the list of inputs, and whose it is.
+    assert_eq!(expected.len(), 11);
     assert!(files(&night.join("shards")) == expected);
 
     // A worker that was killed has left a part behind that is not finished.

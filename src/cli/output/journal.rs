@@ -279,7 +279,10 @@ mod tests {
         let starts: Vec<usize> = (0..7)
             .map(|at| night.lines()[..at].iter().map(Vec::len).sum())
             .collect();
-        for at in (0..night.whole.len()).step_by(97).chain([starts[3] - 1]) {
+        for at in (0..night.whole.len() - 1)
+            .step_by(97)
+            .chain([starts[3] - 1])
+        {
             let line = starts.iter().filter(|start| **start <= at).count() - 1;
             for change in [1, 0x80, 0xff] {
                 let mut text = night.whole.clone();
