@@ -47,7 +47,7 @@ class Sky:
                 break
         refracting = AltAz(obstime=time, location=place, pressure=1013.25 * (1 - 2.25577e-5 * self.height) ** 5.25588 * u.hPa,
                            temperature=(15 - 6.5e-3 * self.height) * u.deg_C, obswl=0.574 * u.um)
-        ra, dec, pm_ra, pm_dec, vmag, _ = catalog
+        ra, dec, pm_ra, pm_dec, vmag, _ = catalog[:, catalog[4] < (8 if narrow else 6.3)]
         years = time.jyear - 2000
         moved = SkyCoord((ra + pm_ra * years / 3600 / np.cos(np.radians(dec))) * u.deg, (dec + pm_dec * years / 3600) * u.deg)
         seen = moved.transform_to(refracting)

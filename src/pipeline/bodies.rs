@@ -154,6 +154,7 @@ mod tests {
     use crate::identify::{DateSource, FrameDate, StarMatch};
     use crate::sky::catalog::StarIndex;
     use crate::sky::places::StarPlaces;
+    use crate::sky::solar_system::TimeError;
     use crate::sky::solar_system::bodies_at;
     use nalgebra::Matrix3;
 

@@ -103,7 +103,9 @@ impl FrameReport {
                     DateSource::FileHeader => "from the file's header",
                     DateSource::FileName => "from the file's name",
                 };
-                let utc = date.iso.replace('T', " ").replace('Z', " UTC");
+                let is_assumed = date.utc_offset_source == Some("assumed");
+                let zone = if is_assumed { "" } else { " UTC" };
+                let utc = date.iso.replace('T', " ").replace('Z', zone);
                 let offset = offset_text(date);
                 format!("{utc}, {source}{offset}: positions for that date")
             }

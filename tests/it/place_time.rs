@@ -35,10 +35,9 @@ fn all_sky() -> CentroidList {
         let apparent = places.of(star);
         let pixel = lens.pixel_of(&attitude.apply(&apparent))?;
         let is_high = apparent.dot(&zenith) > 0.05;
-        is_high.then(|| ListedCentroid {
-            sigma_px: Some(0.1),
-            ..ListedCentroid::new(pixel, f64::from(star.v_mag))
-        })
+        let mut listed = ListedCentroid::new(pixel, f64::from(star.v_mag));
+        listed.sigma_px = Some(0.1);
+        is_high.then_some(listed)
     });
     CentroidList {
         width: SIDE_PX as usize,

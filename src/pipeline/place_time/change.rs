@@ -141,7 +141,8 @@ pub(super) fn candidates(
     simple.chain(place).chain(other_dates(stated)).collect()
 }
 
-/// The dates that have the same sidereal time within hours, and whose numbers may have been misread.
+/// The dates whose numbers may have been misread, and those of a clock that is a year or two off. Few, so that
+/// chance hardly brings a planet to where a source is.
 pub(super) fn other_dates(stated: (Site, ObservationDate)) -> impl Iterator<Item = Candidate> {
     let (site, date) = stated;
     let orders = date.reordered().into_iter().map(move |date| Candidate {
@@ -149,7 +150,7 @@ pub(super) fn other_dates(stated: (Site, ObservationDate)) -> impl Iterator<Item
         site,
         date,
     });
-    let years = (-10..=10).filter(|years| *years != 0).map(Change::Years);
+    let years = (-2..=2).filter(|years| *years != 0).map(Change::Years);
     let years = years.filter_map(move |change| {
         let (site, date) = change.of(stated)?;
         Some(Candidate { change, site, date })

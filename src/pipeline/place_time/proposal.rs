@@ -26,7 +26,7 @@ pub struct Proposal {
 }
 
 /// Proposals that the best one beats by these odds are left out.
-const MAX_ODDS: f64 = 300.0;
+const MAX_ODDS: f64 = 50.0;
 
 /// Of changes with their costs, those that are nearly as good as the best, one of each kind.
 pub(super) fn of(mut assessed: Vec<(Candidate, f64)>) -> Vec<Proposal> {
