@@ -5,7 +5,7 @@ mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files::{make_directory, write_whole};
+use super::output::files::{make_directory, write_each};
 use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
@@ -146,13 +146,12 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
     let default = || arguments.directory.join("report.html");
     let page_path = arguments.html.checked_path(&[], default)?;
     let nights = summary(&archive)?;
-    if let Some(path) = &page_path {
-        let page = page::of(&archive, &nights)?;
-        write_whole(&[super::page::file(path, &page)?])?;
-    }
-    Ok(Outcome::success(match arguments.format {
+    let page = page_path.map(|path| super::page::file(&path, &page::of(&archive, &nights)?));
+    let all_written = write_each(page);
+    let outcome = Outcome::success(match arguments.format {
         Format::Text => nights_text(&nights),
         Format::Json => json_lines(nights.iter())?,
         Format::Csv => csv_table(nights.iter().map(NightLine::of))?,
-    }))
+    });
+    Ok(outcome.if_written(all_written))
 }
