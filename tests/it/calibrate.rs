@@ -268,7 +268,7 @@ fn copies_of_a_frame_are_one_observation_and_are_named() {
     fs::copy(&frame, &copies[0]).unwrap();
     let read = starpipe::frame::read(&frame).unwrap();
     let levels = read.pixels.to_f32();
-    let levels = levels.iter().map(|level| *level as u16).collect();
+    let levels: Vec<u16> = levels.iter().map(|level| *level as u16).collect();
     let (width, height) = (read.width as u32, read.height as u32);
     let picture = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, levels).unwrap();
     let mut scaled = picture.clone();

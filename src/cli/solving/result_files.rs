@@ -10,13 +10,28 @@ use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
 use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs};
 use starpipe::sky::catalog::Catalog;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Writes result files into a directory, if one is given.
 pub(super) struct ResultFiles<'a> {
     options: &'a OutputOptions,
     /// For the colors of a frame.
     memory: MemoryLimit,
+}
+
+/// An image, and what its result files are made of.
+struct Results<'a> {
+    directory: &'a Path,
+    image: &'a ImageName<'a>,
+    solved: &'a Solved,
+    report: &'a FrameReport,
+}
+
+impl Results<'_> {
+    /// The result file with this extension.
+    fn path(&self, extension: &str) -> PathBuf {
+        output_path(self.directory, self.image.path, self.image.page, extension)
+    }
 }
 
 impl<'a> ResultFiles<'a> {
@@ -42,14 +57,18 @@ impl<'a> ResultFiles<'a> {
         else {
             return Vec::new();
         };
-        let path = |extension: &str| output_path(directory, image.path, image.page, extension);
-        let mut files = self.pictures(image, solved, report, catalog, &path);
-        let data = self.data(solved, report, &path);
+        let of = Results {
+            directory,
+            image,
+            solved,
+            report,
+        };
         let header = wcs::header(&report.frame, &solved.solution);
-        let outdated = header.is_none().then(|| remove_outdated(&path("wcs")));
-        let header = header.map(|header| Ok((path("wcs"), header)));
-        files.splice(0..0, data.into_iter().chain(header));
-        let checked = files.into_iter().map(|file| {
+        let outdated = header.is_none().then(|| remove_outdated(&of.path("wcs")));
+        let header = header.map(|header| Ok((of.path("wcs"), header)));
+        let files = self.data(&of).into_iter().chain(header);
+        let files = files.chain(self.pictures(&of, catalog));
+        let checked = files.map(|file| {
             let (path, content) = file?;
             if image.page.is_some() {
                 // How many images an input has was not known when the others were checked.
@@ -63,14 +82,10 @@ impl<'a> ResultFiles<'a> {
     }
 
     /// The files with numbers.
-    fn data(
-        &self,
-        solved: &Solved,
-        report: &FrameReport,
-        path: &dyn Fn(&str) -> PathBuf,
-    ) -> Vec<anyhow::Result<NewFile>> {
+    fn data(&self, of: &Results) -> Vec<anyhow::Result<NewFile>> {
+        let Results { solved, report, .. } = of;
         let file = |extension: &str, text: anyhow::Result<String>| {
-            Ok((path(extension), text?.into_bytes()))
+            Ok((of.path(extension), text?.into_bytes()))
         };
         let json = report.to_json_line().map(|line| line + "\n");
         let mut files = vec![
@@ -79,7 +94,7 @@ impl<'a> ResultFiles<'a> {
         ];
         for format in self.options.tables() {
             let table = tables::stars(report, &solved.solution, format);
-            files.push(Ok((path(format.extension()), table)));
+            files.push(Ok((of.path(format.extension()), table)));
         }
         if self.options.regions {
             files.push(file("reg", Ok(regions::ds9(report))));
@@ -88,20 +103,19 @@ impl<'a> ResultFiles<'a> {
         if let Some(frame) = frame.filter(|_| self.options.write_fits) {
             let copy = wcs::solved_copy(&report.frame, frame, &solved.solution, RowOrder::TopDown);
             let copy = copy.transpose();
-            files.extend(copy.map(|copy| Ok((path("solved.fits"), copy?))));
+            files.extend(copy.map(|copy| Ok((of.path("solved.fits"), copy?))));
         }
         files
     }
 
     /// The files to look at.
-    fn pictures(
-        &self,
-        image: &ImageName,
-        solved: &Solved,
-        report: &FrameReport,
-        catalog: &Catalog,
-        path: &dyn Fn(&str) -> PathBuf,
-    ) -> Vec<anyhow::Result<NewFile>> {
+    fn pictures(&self, of: &Results, catalog: &Catalog) -> Vec<anyhow::Result<NewFile>> {
+        let Results {
+            image,
+            solved,
+            report,
+            ..
+        } = of;
         let name = image.to_path();
         let title = name.file_name().unwrap_or(name.as_os_str());
         let title = title.to_string_lossy();
@@ -117,14 +131,14 @@ impl<'a> ResultFiles<'a> {
         });
         let drawn = shown.as_ref().map(|shown| {
             let picture = overlay::encoded(shown, &solved.solution, catalog, &overlay)?;
-            Ok((path(overlay.format.extension()), picture))
+            Ok((of.path(overlay.format.extension()), picture))
         });
         let page = self.options.html.then(|| {
             let page = page::html(report, &solved.solution, shown.as_ref(), &overlay)?;
-            Ok((path("html"), page.into_bytes()))
+            Ok((of.path("html"), page.into_bytes()))
         });
         let sky = sky_figure::svg(report);
-        let sky = sky.map(|figure| Ok((path("sky.svg"), figure.into_bytes())));
+        let sky = sky.map(|figure| Ok((of.path("sky.svg"), figure.into_bytes())));
         drawn.into_iter().chain(page).chain(sky).collect()
     }
 
