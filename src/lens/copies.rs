@@ -8,12 +8,12 @@ use crate::base::statistics::log10_binomial_tail;
 use crate::identify::fit::MeasuredStar;
 use nalgebra::Complex;
 
-/// Errors may be stated too large by this factor.
+/// Errors may be stated too large by this factor: in pictures that are compressed strongly they are.
 const OVERSTATED: f64 = 2.0;
 /// log10 of the probability with which two observations have places that are as equal.
 const CERTAIN_LOG10: f64 = -9.0;
 /// Squared distances, in the variance of their difference, below which stars are counted.
-const NEAR: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+const NEAR: [f64; 7] = [0.5, 0.2, 0.1, 1e-2, 1e-3, 1e-5, 1e-6];
 /// Stars whose differences the motion takes: four parameters.
 const TAKEN: usize = 2;
 
