@@ -44,3 +44,71 @@ pub(super) fn variance_factor(frames: &[JointFrame], fit: &JointFit, directions:
         1.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::coords::{PixelPoint, Rotation, UnitVector};
+    use crate::camera::CameraModel;
+    use crate::identify::fit::{MeasuredStar, fit_jointly};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const SIGMA_PX: f64 = 0.1;
+
+    /// A frame of 60 stars by a camera whose focal length is `ratio` times the usual one.
+    fn frame(ratio: f64, rng: &mut ChaCha8Rng) -> JointFrame {
+        let camera = CameraModel::pinhole(1024.0, 768.0, 1500.0 * ratio, false);
+        let place =
+            UnitVector::from_ra_dec(rng.random_range(0.0..6.0), rng.random_range(-1.0..1.0));
+        let icrs_to_camera = Rotation::looking_at(&place, rng.random_range(-3.0..3.0));
+        let stars = (0..60).map(|_| {
+            let [x, y] = [1024.0, 768.0].map(|side| rng.random_range(0.0..side));
+            let direction = camera.direction_of(&PixelPoint::new(x, y)).unwrap();
+            let [x, y] = [x, y].map(|at| at + SIGMA_PX * rng.sample::<f64, _>(StandardNormal));
+            MeasuredStar {
+                pixel: PixelPoint::new(x, y),
+                icrs: icrs_to_camera.inverse().apply(&direction),
+                sigma_px: SIGMA_PX,
+            }
+        });
+        JointFrame {
+            stars: stars.collect(),
+            icrs_to_camera,
+        }
+    }
+
+    /// The mean factor for eight frames whose scales scatter.
+    fn factor(scatter: f64, directions: [usize; 8]) -> f64 {
+        const TRIALS: u32 = 20;
+        let camera = CameraModel::pinhole(1024.0, 768.0, 1500.0, false);
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let trials = (0..TRIALS).map(|_| {
+            let frames = directions.map(|direction| {
+                let side = if direction.is_multiple_of(2) {
+                    1.0
+                } else {
+                    -1.0
+                };
+                frame(1.0 + side * scatter, &mut rng)
+            });
+            let fit = fit_jointly(&frames, &camera, None).unwrap();
+            variance_factor(&frames, &fit, &directions)
+        });
+        trials.sum::<f64>() / f64::from(TRIALS)
+    }
+
+    #[test]
+    fn directions_that_differ_make_the_errors_larger() {
+        let apart = [0, 1, 2, 3, 4, 5, 6, 7];
+        let same = factor(0.0, apart);
+        assert!((1.0..1.35).contains(&same), "{same}");
+        // A frame alone has 3e-5.
+        let differing = factor(1e-4, apart);
+        assert!(differing > 4.0, "{differing}");
+        assert_eq!(factor(1e-4, [0; 8]), 1.0);
+        let of_two = factor(1e-4, [0, 0, 0, 0, 1, 1, 1, 1]);
+        assert!(of_two > 3.0, "{of_two}");
+    }
+}

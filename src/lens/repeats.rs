@@ -210,3 +210,50 @@ impl CommonError {
         (self.noise_share * noise_px * noise_px + self.variance_px2).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// What is found of errors of `noise_px` to its double, of which a share is in common, and of `common_px`, in
+    /// common, of as many observations at each of 300 places.
+    fn found(observations: usize, noise_px: f64, [share, common_px]: [f64; 2]) -> CommonError {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let place = |number: usize| {
+            let mut products = Products::default();
+            let noise_px = noise_px * (1.0 + number as f64 / 300.0);
+            let repeated =
+                [0, 1].map(|_| share.sqrt() * noise_px * normal() + common_px * normal());
+            for _ in 0..observations {
+                let residual = repeated.map(|px| px + (1.0 - share).sqrt() * noise_px * normal());
+                products.add(noise_px, common_px, residual);
+            }
+            products
+        };
+        let places: Vec<Products> = (0..300).map(place).collect();
+        CommonError::of(&places, 1.0)
+    }
+
+    #[test]
+    fn what_observations_have_in_common_is_measured() {
+        for observations in [2, 8] {
+            let none = found(observations, 0.1, [0.0, 0.0]);
+            assert!(none.sigma_px(0.15) < 0.05, "{none:?}");
+            let half = found(observations, 0.1, [0.0, 0.15]);
+            let common_px = half.sigma_px(0.15);
+            assert!((common_px - 0.15).abs() < 0.025, "{half:?}");
+            let noise = found(observations, 0.1, [0.6, 0.0]);
+            let common_px = noise.sigma_px(0.15);
+            assert!(
+                (common_px - 0.6_f64.sqrt() * 0.15).abs() < 0.025,
+                "{noise:?}"
+            );
+        }
+        let single = CommonError::of(&[Products::default()], 1.0);
+        assert_eq!(single, CommonError::default());
+    }
+}
