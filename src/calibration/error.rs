@@ -1,5 +1,6 @@
 //! Errors of calibration.
 
+use crate::base::format::excerpt;
 use crate::frame::Frame;
 use std::io;
 use std::path::PathBuf;
@@ -71,7 +72,7 @@ pub enum CalibrationError {
         source: io::Error,
     },
     /// The list of hot pixels has an invalid line.
-    #[error("{}, line {line}: found {found}, expected {expected}", path.display())]
+    #[error("{}, line {line}: found {}, expected {expected}", path.display(), excerpt(.found))]
     Malformed {
         /// The list.
         path: PathBuf,

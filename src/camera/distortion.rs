@@ -214,6 +214,12 @@ impl Distortion {
         [self.coefficients_px[AXIS], self.coefficients_px[AXIS + 1]]
     }
 
+    /// Stretch and skew, in units of R.
+    pub(crate) fn stretch(&self) -> [f64; 2] {
+        let c = self.normalized();
+        [c[STRETCH], c[STRETCH + 1]]
+    }
+
     /// The coefficients of the lens in units of R.
     #[inline(always)]
     fn normalized(&self) -> [f64; LENS_TERMS] {

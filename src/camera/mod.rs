@@ -12,6 +12,7 @@ pub mod data_sheet;
 mod distortion;
 mod known_lens;
 mod model;
+mod plausible;
 mod projection;
 
 pub use distortion::{Distortion, DistortionModel, LENS_TERMS};
@@ -21,4 +22,5 @@ pub use model::CameraModel;
 #[doc(hidden)]
 pub use model::focal_length_px;
 pub(crate) use model::frame_centre;
+pub use plausible::ImplausibleLens;
 pub use projection::Projection;

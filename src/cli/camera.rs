@@ -61,7 +61,7 @@ fn new(arguments: &NewArgs) -> Result<Outcome, CommandError> {
             path.display()
         )));
     }
-    write_whole(&[(path.clone(), text.into_bytes())])?;
+    write_whole(path, text.as_bytes())?;
     Ok(Outcome::success(String::new()))
 }
 

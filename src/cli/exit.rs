@@ -10,6 +10,12 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
+    /// The same, but [`Exit::Failure`] unless everything that was asked for besides is written.
+    pub(crate) fn if_written(self, all: bool) -> Self {
+        let exit = if all { self.exit } else { Exit::Failure };
+        Self { exit, ..self }
+    }
+
     /// Success, with `text` to print.
     pub(crate) fn success(text: String) -> Self {
         Self {

@@ -3,7 +3,7 @@
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
-use super::output::files::{make_directory, write_whole};
+use super::output::files::{NewFile, make_directory, write_each};
 use super::output::overwrite;
 use super::output::paths::output_path;
 use super::progress::frames_bar;
@@ -56,17 +56,17 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
         count: arguments.count,
         seed: arguments.seed,
     };
-    let report = arguments.catalog.with_index(|pool, indexed| {
+    let (report, all_written) = arguments.catalog.with_index(|pool, indexed| {
         let progress = frames_bar(trials.count);
         let done = pool.install(|| run(&published, indexed, trials, &|| progress.inc(1)));
         progress.finish_and_clear();
         let done = done?;
-        if let Some(directory) = &arguments.out {
-            save_overlay(&done, indexed, directory, &name)?;
-        }
-        Ok(done.report)
+        let directory = arguments.out.as_ref();
+        let picture =
+            directory.and_then(|directory| first_picture(&done, indexed, directory, &name));
+        Ok((done.report, write_each(picture)))
     })?;
-    Ok(Outcome {
+    let outcome = Outcome {
         text: match arguments.format {
             PageFormat::Text => report.to_text(),
             PageFormat::Json => report.to_json_line().context("writing JSON")? + "\n",
@@ -76,19 +76,18 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
         } else {
             Exit::NotIdentified
         },
-    })
+    };
+    Ok(outcome.if_written(all_written))
 }
 
-/// Draws the first frame, if there is one.
-fn save_overlay(
+/// The picture of the first frame, if there is one.
+fn first_picture(
     done: &Run,
     indexed: &IndexedCatalog,
     directory: &Path,
     name: &Path,
-) -> anyhow::Result<()> {
-    let Some((frame, solution)) = &done.first else {
-        return Ok(());
-    };
+) -> Option<anyhow::Result<NewFile>> {
+    let (frame, solution) = done.first.as_ref()?;
     let title = format!("{}, simulated", name.display());
     let options = OverlayOptions::default();
     let picture = overlay::encoded(
@@ -96,7 +95,7 @@ fn save_overlay(
         solution,
         indexed.catalog(),
         &options,
-    )?;
+    );
     let path = output_path(directory, name, None, "png");
-    write_whole(&[(path, picture)])
+    Some(picture.map(|picture| (path, picture)).map_err(Into::into))
 }

@@ -65,18 +65,22 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
         return Ok(Exit::Failure.into());
     }
     let flats = stack.measure()?;
-    if let Some(directory) = &arguments.out {
-        let master = master(&flats, arguments.dark.as_deref())?;
-        write_into(directory, [(MASTER.to_owned(), master)])?;
-    }
-    Ok(Outcome {
+    let all_written = arguments.out.as_ref().is_none_or(|directory| {
+        let master = master(&flats, arguments.dark.as_deref());
+        write_into(
+            directory,
+            [master.map(|master| (MASTER.to_owned(), master))],
+        )
+    });
+    let outcome = Outcome {
         text: match arguments.format {
             Format::Text => flats.report().to_text(),
             Format::Json => json_line(&flats.report())?,
             Format::Csv => csv_table(flats.frame_rows())?,
         },
         exit: Exit::of(failed || unread > 0),
-    })
+    };
+    Ok(outcome.if_written(all_written))
 }
 
 impl FlatsArgs {

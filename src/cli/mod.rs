@@ -41,9 +41,8 @@ use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use command::{Arguments, Command};
 use exit::{CommandError, Exit, Outcome};
-use output::messages::report_error;
+use output::messages::{line, report_error};
 use output::stdout::print;
-use starpipe::base::format::printable;
 use starpipe::base::panics::{caught, silence};
 use std::process::ExitCode;
 
@@ -64,7 +63,7 @@ pub(crate) fn run() -> ExitCode {
     match exit {
         Ok(exit) => exit.into(),
         Err(CommandError::Usage(message)) => typed_command(&matches)
-            .error(ErrorKind::ValueValidation, printable(&message))
+            .error(ErrorKind::ValueValidation, line(&message))
             .exit(),
         Err(CommandError::Failed(error)) => {
             report_error(error.as_ref());

@@ -4,6 +4,7 @@ use super::mosaic::BayerPattern;
 use super::orientation::Orientation;
 use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;
+use crate::base::format::excerpt;
 use crate::sky::observer::Site;
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -134,6 +135,7 @@ impl fmt::Display for IgnoredValue {
             found,
             expected,
         } = self;
+        let found = excerpt(found);
         write!(
             f,
             "{keyword} is ignored: found {found}, expected {expected}"

@@ -1,10 +1,14 @@
 //! The calibration: frames are sorted out, the lens is chosen and fitted.
 
+use super::contradictions::contradictions;
+use super::copies::without_copies;
 use super::coverage::Coverage;
 use super::cross_validation::{best_lens, rms_px};
+use super::direction_scatter::variance_factor;
 use super::formats::Pointing;
 use super::frames::{LeftOutFrame, LensFrame, Unfit};
 use super::mount::Mount;
+use super::repeats::{CommonError, Repeats};
 use super::scale_drift::{FrameScale, ScaleDrift};
 use crate::base::statistics::median;
 use crate::camera::{CameraModel, KnownLens};
@@ -18,9 +22,9 @@ const ROUNDS: usize = 5;
 /// The relative difference of focal lengths at which a frame is of another lens.
 const OTHER_FOCAL_LENGTH: f64 = 0.01;
 /// The median distance of a frame's stars, over that of all frames, at which the lens misses them.
-const MISFIT: f64 = 2.0;
+pub(super) const MISFIT: f64 = 2.0;
 /// The least such distance, in pixels.
-const MISFIT_PX: f64 = 0.1;
+pub(super) const MISFIT_PX: f64 = 0.1;
 
 /// Why no lens is measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,6 +61,14 @@ pub struct LensCalibration {
     pub held_out_rms_px: f64,
     /// Error on each axis, in pixels, that the errors of the centroids do not explain.
     pub excess_sigma_px: f64,
+    /// Number of directions that the frames look into.
+    pub directions: usize,
+    /// Standard error on each axis, in pixels, that stars have in common in frames of one direction: of the
+    /// median star. 0 where no two frames have one direction.
+    pub common_sigma_px: f64,
+    /// By how much the directions differ in their lenses, in standard errors: the errors of the lens are
+    /// as much larger. 1 where they agree, and with a single one.
+    pub direction_scatter: f64,
     /// Where in the frame the stars are, and their residuals there.
     pub coverage: Coverage,
     /// Change of the scale over time; without dates of two frames or more there is none.
@@ -110,7 +122,8 @@ pub fn calibrate(
     left_out: Vec<LeftOutFrame>,
 ) -> Result<LensCalibration, CalibrateError> {
     let mut left_out = left_out;
-    let mut frames = alike(frames, &mut left_out);
+    let frames = alike(frames, &mut left_out);
+    let mut frames = without_copies(frames, &mut left_out);
     if frames.is_empty() {
         return Err(CalibrateError::NoFrame);
     }
@@ -142,7 +155,7 @@ fn alike(frames: Vec<LensFrame>, left_out: &mut Vec<LeftOutFrame>) -> Vec<LensFr
     };
     let focal_px = |frame: &LensFrame| frame.camera.central_focal_length_px();
     let of_kind = frames.iter().filter(|frame| frame.kind() == kind);
-    let mut focal_lengths_px: Vec<f64> = of_kind.map(focal_px).collect();
+    let mut focal_lengths_px = most_alike(&of_kind.map(focal_px).collect::<Vec<_>>());
     let expected_px = median(&mut focal_lengths_px);
     let mut kept = Vec::new();
     for frame in frames {
@@ -175,10 +188,24 @@ fn alike(frames: Vec<LensFrame>, left_out: &mut Vec<LeftOutFrame>) -> Vec<LensFr
     kept
 }
 
+/// The focal lengths that most others are like; of equally many the first.
+fn most_alike(focal_lengths_px: &[f64]) -> Vec<f64> {
+    let like = |focal_px: &f64| {
+        let are_like = |other: &&f64| (*other / focal_px - 1.0).abs() <= OTHER_FOCAL_LENGTH;
+        let alike = focal_lengths_px.iter().filter(are_like);
+        alike.copied().collect::<Vec<f64>>()
+    };
+    let sets = focal_lengths_px.iter().rev().map(like);
+    sets.max_by_key(Vec::len).unwrap_or_default()
+}
+
 /// A lens fitted to frames.
 struct Fitted {
     fit: JointFit,
-    excess_sigma_px: f64,
+    errors: Errors,
+    /// The stars with all of their errors.
+    weighted: Vec<JointFrame>,
+    repeats: Repeats,
     held_out_rms_px: f64,
     /// Median distance of the stars of each frame, in pixels.
     distances_px: Vec<f64>,
@@ -187,40 +214,53 @@ struct Fitted {
 impl Fitted {
     fn new(frames: &[LensFrame]) -> Option<Self> {
         let stated: Vec<JointFrame> = frames.iter().map(|frame| frame.joint.clone()).collect();
+        let repeats = Repeats::new(frames);
         let richest = frames
             .iter()
             .max_by_key(|frame| (frame.stars(), frame.camera.distortion_model()))?;
         let start = richest.camera;
         // Residuals tell the errors, and these weigh the stars for the choice of a lens.
         let first = fit_jointly(&stated, &start, start.distortion_model())?;
-        let (_, weighted) = reweighed(&stated, &first);
-        let tested = best_lens(&weighted, &first.camera)?;
+        let (mut errors, mut weighted) = reweighed(&stated, &first, &repeats);
+        let tested = best_lens(&weighted, &repeats, &first.camera)?;
         let mut fit = fit_jointly(
             &weighted,
             &first.camera.reprojected(tested.projection),
             tested.model,
         )?;
-        let mut excess_sigma_px = 0.0;
         for _ in 0..ROUNDS {
-            let weighted;
-            (excess_sigma_px, weighted) = reweighed(&stated, &fit);
+            (errors, weighted) = reweighed(&stated, &fit, &repeats);
             fit = fit_jointly(&weighted, &fit.camera, tested.model)?;
         }
-        let distances_px = fit.residuals_px.iter().map(|residuals| {
-            let mut distances: Vec<f64> =
-                residuals.iter().map(|[x, y]| libm::hypot(*x, *y)).collect();
-            median(&mut distances)
-        });
         Some(Self {
-            excess_sigma_px,
+            errors,
+            weighted,
+            repeats,
             held_out_rms_px: tested.rms_px,
-            distances_px: distances_px.collect(),
+            distances_px: distances_px(&fit),
             fit,
         })
     }
 
-    /// The frames whose stars the lens misses, with the reason.
+    /// The frames whose stars the lens misses, with the reason; where it misses those of all alike, the frames
+    /// that contradict the others.
     fn misfits(&self) -> Vec<(usize, Unfit)> {
+        /// Lenses that differ more than this, in the variance of their errors, are compared.
+        const CONTRADICTION: f64 = 25.0;
+        let missed = self.missed();
+        if missed.is_empty() && self.variance_factor() > CONTRADICTION {
+            return contradictions(&self.weighted, &self.fit);
+        }
+        missed
+    }
+
+    /// By how much the squared errors of the lens are larger than the stars alone say.
+    fn variance_factor(&self) -> f64 {
+        variance_factor(&self.weighted, &self.fit, &self.repeats.directions)
+    }
+
+    /// The frames whose stars the lens misses, and those of the others not.
+    fn missed(&self) -> Vec<(usize, Unfit)> {
         let expected_px = median(&mut self.distances_px.clone());
         let limit_px = (MISFIT * expected_px).max(MISFIT_PX);
         let frames = self.distances_px.iter().enumerate();
@@ -238,24 +278,38 @@ impl Fitted {
             .collect()
     }
 
+    /// The error that stars have in common in frames of one direction, of the median star.
+    fn common_sigma_px(&self, frames: &[LensFrame]) -> f64 {
+        if self.repeats.direction_count() == frames.len() {
+            return 0.0;
+        }
+        let stars = frames.iter().flat_map(|frame| &frame.joint.stars);
+        let mut noises_px: Vec<f64> = stars.map(|star| star.sigma_px).collect();
+        self.errors.common.sigma_px(median(&mut noises_px))
+    }
+
     fn calibration(
         self,
         frames: Vec<LensFrame>,
         left_out: Vec<LeftOutFrame>,
     ) -> Option<LensCalibration> {
+        let factor = self.variance_factor();
+        let common_sigma_px = self.common_sigma_px(&frames);
         let Self {
             fit,
-            excess_sigma_px,
+            errors,
+            repeats,
             held_out_rms_px,
             ..
         } = self;
+        let excess_sigma_px = errors.excess_sigma_px;
         let attitudes = fit.attitudes.iter().copied();
         let frames: Vec<LensFrame> = frames
             .into_iter()
             .zip(attitudes)
             .map(|(frame, attitude)| frame.with_attitude(attitude))
             .collect();
-        let camera = limited(&fit.camera, &frames);
+        let camera = limited(&fit.camera, &frames, &repeats);
         let used = frames
             .iter()
             .zip(&fit.residuals_px)
@@ -277,7 +331,10 @@ impl Fitted {
             mount: Mount::of(&frames),
             stars: frames.iter().map(LensFrame::stars).sum(),
             rms_px: rms_of(fit.residuals_px.iter().flatten()),
-            lens: KnownLens::new(camera, fit.covariance)?,
+            lens: KnownLens::new(camera, fit.covariance * factor)?,
+            directions: repeats.direction_count(),
+            common_sigma_px,
+            direction_scatter: factor.sqrt(),
             frames: used,
             left_out,
             held_out_rms_px,
@@ -287,20 +344,20 @@ impl Fitted {
 }
 
 /// The camera, known as far from the axis as there are stars.
-fn limited(camera: &CameraModel, frames: &[LensFrame]) -> CameraModel {
-    /// As many stars at least are as far from the axis.
+fn limited(camera: &CameraModel, frames: &[LensFrame], repeats: &Repeats) -> CameraModel {
+    /// As many stars at least are as far from the axis; one that frames of one direction repeat is one.
     const OUTERMOST: usize = 5;
     /// A lens that is known so far of the way to the corners is known up to them.
     const NEARLY: f64 = 0.9;
     let axis = camera.direction_of(&camera.axis());
-    let angles = frames
-        .iter()
-        .flat_map(|frame| &frame.joint.stars)
-        .filter_map(|star| {
-            let direction = camera.direction_of(&star.pixel)?;
-            Some(direction.angle_to(axis.as_ref()?))
-        });
-    let mut angles_rad: Vec<f64> = angles.collect();
+    let stars = frames.iter().flat_map(|frame| &frame.joint.stars);
+    let mut angles_rad = vec![0.0_f64; repeats.place_count()];
+    for (star, place) in stars.zip(repeats.places.iter().flatten()) {
+        let direction = camera.direction_of(&star.pixel);
+        if let Some((direction, axis)) = direction.zip(axis.as_ref()) {
+            angles_rad[*place] = angles_rad[*place].max(direction.angle_to(axis));
+        }
+    }
     angles_rad.sort_by(|a, b| b.total_cmp(a));
     let known_rad = angles_rad.get(OUTERMOST.min(angles_rad.len().saturating_sub(1)));
     let corners = camera.corners();
@@ -309,11 +366,23 @@ fn limited(camera: &CameraModel, frames: &[LensFrame]) -> CameraModel {
         .filter_map(|corner| Some(camera.direction_of(corner)?.angle_to(axis.as_ref()?)));
     let corner_rad = corners_rad.fold(0.0, f64::max);
     match known_rad {
-        Some(known_rad) if corner_rad == 0.0 || *known_rad < NEARLY * corner_rad => {
+        // What is beyond the stars may fold.
+        Some(known_rad)
+            if corner_rad == 0.0 || *known_rad < NEARLY * corner_rad || camera.check().is_err() =>
+        {
             camera.limited_to(*known_rad)
         }
         _ => *camera,
     }
+}
+
+/// The median distance of the stars of each frame, in pixels.
+pub(super) fn distances_px(fit: &JointFit) -> Vec<f64> {
+    let of_frame = |residuals: &Vec<[f64; 2]>| {
+        let distances = residuals.iter().map(|[x, y]| libm::hypot(*x, *y));
+        median(&mut distances.collect::<Vec<f64>>())
+    };
+    fit.residuals_px.iter().map(of_frame).collect()
 }
 
 /// Standard deviation of residuals on each axis.
@@ -321,21 +390,40 @@ fn rms_of<'a>(residuals: impl Iterator<Item = &'a [f64; 2]>) -> f64 {
     rms_px(&mut residuals.map(|[x, y]| x * x + y * y).collect::<Vec<_>>())
 }
 
-/// The error on each axis that the stated ones lack to explain the residuals of `fit`, and the stars with
-/// it; outliers have larger ones.
-fn reweighed(stated: &[JointFrame], fit: &JointFit) -> (f64, Vec<JointFrame>) {
+/// What errors the stars have besides the stated ones.
+#[derive(Debug, Clone, Copy)]
+struct Errors {
+    /// On each axis, in pixels, what the stated ones lack to explain the residuals.
+    excess_sigma_px: f64,
+    /// What frames of one direction have in common.
+    common: CommonError,
+}
+
+/// The errors that the residuals of `fit` show, and the stars with them; outliers have larger ones.
+fn reweighed(
+    stated: &[JointFrame],
+    fit: &JointFit,
+    repeats: &Repeats,
+) -> (Errors, Vec<JointFrame>) {
     let excess_sigma_px = excess_sigma_px(stated, fit);
+    let common = repeats.common_error(stated, fit, excess_sigma_px);
     let frames = stated.iter().zip(&fit.attitudes).zip(&fit.residuals_px);
-    let weighted = frames.map(|((frame, attitude), residuals)| {
+    let frames = frames.zip(&repeats.places);
+    let weighted = frames.map(|(((frame, attitude), residuals), places)| {
         let mut frame = frame.clone();
         frame.icrs_to_camera = *attitude;
-        for (star, [x, y]) in frame.stars.iter_mut().zip(residuals) {
+        for ((star, [x, y]), place) in frame.stars.iter_mut().zip(residuals).zip(places) {
             let sigma_px = libm::hypot(star.sigma_px, excess_sigma_px);
-            star.sigma_px = robust_sigma_px(sigma_px, libm::hypot(*x, *y));
+            let sigma_px = robust_sigma_px(sigma_px, libm::hypot(*x, *y));
+            star.sigma_px = repeats.sigma_px(*place, &common, [star.sigma_px, sigma_px]);
         }
         frame
     });
-    (excess_sigma_px, weighted.collect())
+    let errors = Errors {
+        excess_sigma_px,
+        common,
+    };
+    (errors, weighted.collect())
 }
 
 /// The error on each axis that the stated ones lack to explain the median residual.

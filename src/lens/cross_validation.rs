@@ -1,5 +1,7 @@
 //! Which lens predicts best the stars that a fit leaves out?
 
+use super::repeats::Repeats;
+use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::statistics::median;
 use crate::camera::{CameraModel, DistortionModel, Projection};
 use crate::identify::fit::{
@@ -24,7 +26,11 @@ pub(super) struct Tested {
 
 /// The lens that predicts left-out stars best for its number of terms. Only a wide field tells
 /// projections apart. `None` where no lens can be fitted.
-pub(super) fn best_lens(frames: &[JointFrame], start: &CameraModel) -> Option<Tested> {
+pub(super) fn best_lens(
+    frames: &[JointFrame],
+    repeats: &Repeats,
+    start: &CameraModel,
+) -> Option<Tested> {
     let stars: usize = frames.iter().map(|frame| frame.stars.len()).sum();
     let equations = 2.0 * stars as f64;
     let projections = if start.radius_rad() > WIDE_RAD {
@@ -32,9 +38,15 @@ pub(super) fn best_lens(frames: &[JointFrame], start: &CameraModel) -> Option<Te
     } else {
         vec![Projection::Pinhole]
     };
+    let parted = Parted {
+        frames,
+        parts: (0..frames.len())
+            .map(|frame| repeats.parts(frame, FOLDS))
+            .collect(),
+    };
     let of_projection = |projection: Projection| {
         let penalty = worth_a_projection(projection);
-        let tested = best_model(frames, &start.reprojected(projection), stars)?;
+        let tested = best_model(&parted, &start.reprojected(projection), stars)?;
         Some((equations * libm::log(tested.chi_sq) + penalty, tested))
     };
     let tested = projections.into_iter().filter_map(of_projection);
@@ -43,7 +55,7 @@ pub(super) fn best_lens(frames: &[JointFrame], start: &CameraModel) -> Option<Te
 }
 
 /// The simplest distortion that no richer one clearly surpasses.
-fn best_model(frames: &[JointFrame], start: &CameraModel, stars: usize) -> Option<Tested> {
+fn best_model(frames: &Parted, start: &CameraModel, stars: usize) -> Option<Tested> {
     let equations = 2.0 * stars as f64;
     let mut best: Option<Tested> = None;
     let models = DistortionModel::ALL.map(Some);
@@ -70,27 +82,39 @@ pub(super) fn rms_px(squares_px2: &mut [f64]) -> f64 {
     (median(squares_px2) / (2.0 * LN_2)).sqrt()
 }
 
+/// Frames, and the part that each star of them is in.
+struct Parted<'a> {
+    frames: &'a [JointFrame],
+    parts: Vec<Vec<usize>>,
+}
+
+impl Parted<'_> {
+    /// The frames with the stars of one part, or of all others, and with these attitudes.
+    fn part(
+        &self,
+        fold: usize,
+        is_in: bool,
+        attitudes: &[Rotation<Icrs, Camera>],
+    ) -> Vec<JointFrame> {
+        let frames = self.frames.iter().zip(&self.parts).zip(attitudes);
+        let of_part = frames.map(|((frame, parts), attitude)| {
+            let stars = frame.stars.iter().zip(parts);
+            let stars = stars.filter(|(_, part)| (**part == fold) == is_in);
+            JointFrame {
+                stars: stars.map(|(star, _)| *star).collect(),
+                icrs_to_camera: *attitude,
+            }
+        });
+        of_part.collect()
+    }
+}
+
 /// How a lens predicts the stars that are left out.
-fn test(
-    frames: &[JointFrame],
-    start: &CameraModel,
-    model: Option<DistortionModel>,
-) -> Option<Tested> {
-    let whole = fit_jointly(frames, start, model)?;
+fn test(parted: &Parted, start: &CameraModel, model: Option<DistortionModel>) -> Option<Tested> {
+    let whole = fit_jointly(parted.frames, start, model)?;
     let (mut chi_sq, mut squares) = (0.0, Vec::new());
     for fold in 0..FOLDS {
-        let part = |is_in: bool| {
-            let frame = |(frame, attitude): (&JointFrame, _)| {
-                let stars = frame.stars.iter().enumerate();
-                let stars = stars.filter(|(number, _)| (number % FOLDS == fold) == is_in);
-                JointFrame {
-                    stars: stars.map(|(_, star)| *star).collect(),
-                    icrs_to_camera: attitude,
-                }
-            };
-            let attitudes = whole.attitudes.iter().copied();
-            frames.iter().zip(attitudes).map(frame).collect::<Vec<_>>()
-        };
+        let part = |is_in| parted.part(fold, is_in, &whole.attitudes);
         let fit = fit_jointly(&part(false), &whole.camera, model)?;
         for (left_out, attitude) in part(true).iter().zip(&fit.attitudes) {
             let residuals = residuals_px(&left_out.stars, &fit.camera, attitude)?;

@@ -6,8 +6,10 @@ use crate::base::epoch::ObservationDate;
 use crate::camera::CameraModel;
 use crate::identify::fit::JointFrame;
 use crate::pipeline::{Outcome, Reason, Solution};
+use crate::sky::catalog::StarIndex;
 use crate::sky::observer::Observation;
 use crate::sky::places::StarPlaces;
+use std::cmp::Ordering;
 
 /// A frame with its stars.
 #[derive(Debug, Clone)]
@@ -20,6 +22,10 @@ pub struct LensFrame {
     pub(super) date: Option<ObservationDate>,
     pub(super) observation: Option<Observation>,
     pub(super) joint: JointFrame,
+    /// The catalogue star that each of its stars is.
+    names: Vec<StarIndex>,
+    /// Indices of its stars, in the order of these.
+    by_name: Vec<usize>,
 }
 
 /// A frame that is left out.
@@ -41,8 +47,14 @@ pub enum Unfit {
         /// Code of the reason.
         code: &'static str,
     },
+    /// Its stars are off by the same noise as those of another frame: it is no further observation.
+    #[error("its stars have the noise of those of {of}: both are one observation")]
+    Copy {
+        /// The name of the other.
+        of: String,
+    },
     /// It has another size, or is mirrored differently.
-    #[error("its {found} are not those of the others, {expected}")]
+    #[error("its size, {found}, is not that of the others, {expected}")]
     OtherSize {
         /// What it has.
         found: String,
@@ -74,6 +86,7 @@ impl Unfit {
     pub const fn code(&self) -> &'static str {
         match self {
             Self::NotIdentified { .. } => "not_identified",
+            Self::Copy { .. } => "copy",
             Self::OtherSize { .. } => "other_size",
             Self::OtherFocalLength { .. } => "other_focal_length",
             Self::Misfit { .. } => "misfit",
@@ -94,14 +107,19 @@ impl LensFrame {
                 return Err(Unfit::NotIdentified { code });
             }
         };
+        let (names, stars): (Vec<_>, Vec<_>) = solution.named_stars(found).unzip();
+        let mut by_name: Vec<usize> = (0..names.len()).collect();
+        by_name.sort_by_key(|star| names[*star]);
         Ok(Self {
             name: name.to_owned(),
+            names,
+            by_name,
             camera: found.camera,
             places: found.places,
             date: solution.date.map(|known| known.date),
             observation: solution.observation,
             joint: JointFrame {
-                stars: solution.measured_stars(found).collect(),
+                stars,
                 icrs_to_camera: found.icrs_to_camera,
             },
         })
@@ -110,6 +128,29 @@ impl LensFrame {
     /// Number of its stars.
     pub fn stars(&self) -> usize {
         self.joint.stars.len()
+    }
+
+    /// The catalogue star that each of its stars is.
+    pub(super) fn names(&self) -> &[StarIndex] {
+        &self.names
+    }
+
+    /// Pairs of indices of the stars that this frame and another one have in common.
+    pub(super) fn shared_stars(&self, other: &Self) -> Vec<[usize; 2]> {
+        let mut shared = Vec::new();
+        let (mut own, mut others) = (self.by_name.iter(), other.by_name.iter());
+        let (mut a, mut b) = (own.next(), others.next());
+        while let (Some(&star), Some(&of_other)) = (a, b) {
+            match self.names[star].cmp(&other.names[of_other]) {
+                Ordering::Less => a = own.next(),
+                Ordering::Greater => b = others.next(),
+                Ordering::Equal => {
+                    shared.push([star, of_other]);
+                    (a, b) = (own.next(), others.next());
+                }
+            }
+        }
+        shared
     }
 
     /// The same with another attitude.

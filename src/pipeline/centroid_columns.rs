@@ -2,6 +2,7 @@
 
 use super::centroid_list::ListedCentroid;
 use crate::base::coords::PixelPoint;
+use crate::base::format::excerpt;
 use crate::detect::DetectionFlags;
 use crate::photometry::instrumental_mag;
 use csv::StringRecord;
@@ -219,7 +220,10 @@ impl Columns {
         };
         match value {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("column {name}: '{text}' is not a number")),
+            _ => Err(format!(
+                "column {name}: '{}' is not a number",
+                excerpt(text)
+            )),
         }
     }
 }
@@ -248,7 +252,7 @@ fn no_positions(headings: &StringRecord) -> String {
     format!(
         "line 1 has {columns} {}; expected {expected} among them, or the names of photutils or \
          SExtractor, with commas, semicolons, tabs or blanks between",
-        named.join(", ")
+        excerpt(&named.join(", "))
     )
 }
 

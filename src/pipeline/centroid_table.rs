@@ -5,7 +5,7 @@ use super::centroid_list::{CentroidList, ListedCentroid};
 use super::centroid_text::ListText;
 use crate::base::coords::PixelPoint;
 use crate::base::files;
-use crate::base::format::table_name;
+use crate::base::format::{excerpt, table_name};
 use crate::base::remedy::Remedy;
 use crate::base::size::Size;
 use crate::identify::Photometry;
@@ -201,6 +201,7 @@ impl<'a> Frames<'a> {
         if count > MAX_NAMED {
             names += ", …";
         }
+        let names = excerpt(&names);
         match self.chosen {
             None if count > 1 => Err(CentroidListError {
                 remedies: &[Remedy::Frame],

@@ -14,6 +14,7 @@ use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::photometry::sky_map::SkyMap;
+use crate::sky::catalog::StarIndex;
 use crate::sky::observer::{Observation, Site};
 use crate::sky::places::AttitudeFrame;
 
@@ -97,15 +98,24 @@ impl Solution {
         &'a self,
         found: &'a Identification,
     ) -> impl Iterator<Item = MeasuredStar> + 'a {
+        self.named_stars(found).map(|(_, star)| star)
+    }
+
+    /// [`measured_stars`](Self::measured_stars), each with the catalogue star that it is.
+    pub(crate) fn named_stars<'a>(
+        &'a self,
+        found: &'a Identification,
+    ) -> impl Iterator<Item = (StarIndex, MeasuredStar)> + 'a {
         found.matches.iter().filter_map(|named| {
             let source = self.source(named.source);
             let [x, y] = source.measured?.sigma_px;
             let sigma_px = (0.5 * (x * x + y * y)).sqrt();
-            sigma_px.is_finite().then_some(MeasuredStar {
+            let star = MeasuredStar {
                 pixel: source.position,
                 icrs: named.light,
                 sigma_px: sigma_px.max(1e-3),
-            })
+            };
+            sigma_px.is_finite().then_some((named.star, star))
         })
     }
 }

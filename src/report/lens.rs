@@ -31,6 +31,12 @@ pub struct LensReport {
     pub held_out_rms_px: f64,
     /// Error on each axis that the errors of the centroids do not explain.
     pub excess_sigma_px: f64,
+    /// Number of directions that the frames look into.
+    pub directions: usize,
+    /// Error on each axis that stars have in common in frames of one direction.
+    pub common_sigma_px: f64,
+    /// By how much the lenses of the directions differ, in standard errors; the errors are as much larger.
+    pub direction_scatter: f64,
     /// Share of the frame in which there are stars.
     pub coverage: f64,
     /// Stars and mean residuals by place.
@@ -142,6 +148,9 @@ impl LensReport {
             rms_px: to_decimals(calibration.rms_px, 4),
             held_out_rms_px: to_decimals(calibration.held_out_rms_px, 4),
             excess_sigma_px: to_decimals(calibration.excess_sigma_px, 4),
+            directions: calibration.directions,
+            common_sigma_px: to_decimals(calibration.common_sigma_px, 4),
+            direction_scatter: to_decimals(calibration.direction_scatter, 3),
             coverage: to_decimals(calibration.coverage.share(), 3),
             map: calibration.coverage.clone(),
             drift: calibration.drift.map(|drift| DriftValues {
@@ -188,6 +197,29 @@ impl LensReport {
         text
     }
 
+    /// What the directions of the frames say of the errors.
+    fn directions_text(&self) -> String {
+        let mut text = self.directions.to_string();
+        if self.directions < self.frames.len() {
+            let _ = write!(
+                text,
+                " for {} frames; what these have in common, {:.3} px, counts once",
+                self.frames.len(),
+                self.common_sigma_px
+            );
+        }
+        if self.directions == 1 {
+            text += "; how the lens differs in others is not in its errors";
+        } else if self.direction_scatter > 1.0 {
+            let _ = write!(
+                text,
+                "; they differ by {:.2} of the errors, which are as much larger",
+                self.direction_scatter
+            );
+        }
+        text
+    }
+
     /// What is said of the lens, each with its name.
     #[doc(hidden)]
     pub fn lines(&self) -> Vec<(&'static str, String)> {
@@ -223,6 +255,7 @@ impl LensReport {
                 "stars in",
                 format!("{:.0} % of the frame", 100.0 * self.coverage),
             ),
+            ("directions", self.directions_text()),
         ];
         if !lens.coefficients_px.is_empty() {
             let terms = lens.coefficients_px.iter().zip(&lens.sigma_px);

@@ -1,6 +1,7 @@
 //! The lens of a camera, measured in several frames and held, through the program.
 
 use crate::common::{Ran, number, starpipe};
+use image::{ImageBuffer, Luma};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -253,5 +254,136 @@ fn what_is_no_night_is_refused_and_files_are_kept() {
         ran.stderr.contains("none of the frames is identified"),
         "{}",
         ran.stderr
+    );
+}
+
+#[test]
+fn copies_of_a_frame_are_one_observation_and_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let night = directory.path().join("night");
+    frames(&night, &[&LENS[..], &["--seed=3", "--count=2"]].concat());
+    let path = |name: &str| directory.path().join(name);
+    let frame = night.join("frame-00000.tif");
+    let copies = [path("copy.tif"), path("scaled.png"), path("turned.png")];
+    fs::copy(&frame, &copies[0]).unwrap();
+    let read = starpipe::frame::read(&frame).unwrap();
+    let levels = read.pixels.to_f32();
+    let levels: Vec<u16> = levels.iter().map(|level| *level as u16).collect();
+    let (width, height) = (read.width as u32, read.height as u32);
+    let picture = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, levels).unwrap();
+    let mut scaled = picture.clone();
+    for pixel in scaled.pixels_mut() {
+        pixel.0[0] = 500 + pixel.0[0] / 2;
+    }
+    scaled.save(&copies[1]).unwrap();
+    image::imageops::rotate180(&picture)
+        .save(&copies[2])
+        .unwrap();
+    let paths: Vec<&Path> = copies.iter().map(PathBuf::as_path).collect();
+    let (alone, _) = calibrated(&[&frame], &[]);
+    let (found, status) = calibrated(&[&[frame.as_path()], &paths[..]].concat(), &[]);
+    assert_eq!(status, 3, "frames are left out");
+    assert_eq!(found["lens"], alone["lens"]);
+    let left_out = found["left_out"].as_array().unwrap();
+    assert_eq!(left_out.len(), copies.len(), "{left_out:?}");
+    for left_out in left_out {
+        assert_eq!(left_out["code"], "copy");
+        let text = left_out["text"].as_str().unwrap();
+        assert!(text.contains("frame-00000.tif"), "{text}");
+    }
+    let other = night.join("frame-00001.tif");
+    let (both, status) = calibrated(&[&frame, &other], &[]);
+    assert_eq!((status, &both["directions"]), (0, &2.into()));
+}
+
+#[test]
+fn frames_of_one_direction_are_known_to_be_and_their_outermost_stars_count_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let night = directory.path().join("night");
+    let pointing = ["--ra=83.8", "--dec=-1.2", "--count=4", "--seed=5", "--out"];
+    let ran = Ran::new(
+        starpipe()
+            .args(["simulate", DATE])
+            .arg(format!("--camera={CAMERA}"))
+            .args(LENS)
+            .args(pointing)
+            .arg(&night),
+    );
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let frame = night.join("frame-00000.tif");
+    let (one, _) = calibrated(&[&frame], &[]);
+    let paths = (0..4).map(|number| night.join(format!("frame-{number:05}.tif")));
+    let paths: Vec<PathBuf> = paths.collect();
+    let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    let (all, status) = calibrated(&paths, &[]);
+    assert_eq!(
+        (status, &all["directions"]),
+        (0, &1.into()),
+        "{}",
+        all["left_out"]
+    );
+    let sigma = |found: &Value| number(found, "/lens/focal_length_sigma_px");
+    // The noise of four frames is new: half the error.
+    let ratio = sigma(&all) / sigma(&one);
+    assert!((0.35..0.75).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn what_cannot_be_exported_does_not_cost_the_lens() {
+    let directory = tempfile::tempdir().unwrap();
+    let night = directory.path().join("night");
+    frames(&night, &[&LENS[..], &["--seed=3", "--count=2"]].concat());
+    let (path, out) = lens_file(directory.path());
+    let other = directory.path().join("cv.yaml");
+    let ran = Ran::new(
+        starpipe()
+            .args(["calibrate", "--format=json", DATE, &out, "--platepar"])
+            .arg(directory.path().join("rms.cal"))
+            .arg("--opencv")
+            .arg(&other)
+            .arg("--plot")
+            .arg(directory.path().join("not/there.svg"))
+            .arg(&night),
+    );
+    assert_eq!(ran.status, 1);
+    for told in ["rms.cal: no frame has a site", "not/there.svg"] {
+        assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    }
+    assert!(path.exists() && other.exists());
+    assert!(!directory.path().join("rms.cal").exists());
+    assert_eq!(ran.reports()[0]["lens"]["model"], "pinhole");
+}
+
+#[test]
+fn of_two_lenses_that_contradict_each_other_the_first_is_measured() {
+    let directory = tempfile::tempdir().unwrap();
+    let [night, other] = ["night", "other"].map(|name| directory.path().join(name));
+    let barrel = |px: &'static str| [px, "--count=2", "--seed=3"];
+    frames(&night, &barrel("--distortion-px=-30"));
+    frames(
+        &other,
+        &[&barrel("--distortion-px=10")[..], &["--first=7"]].concat(),
+    );
+    let (found, status) = calibrated(&[&night, &other], &[]);
+    assert_eq!(status, 3);
+    let left_out = found["left_out"].as_array().unwrap();
+    assert_eq!(left_out.len(), 2, "{left_out:?}");
+    for left_out in left_out {
+        assert_eq!(left_out["code"], "misfit");
+        assert!(left_out["frame"].as_str().unwrap().contains("other"));
+    }
+    let off_px = number(&found, "/lens/coefficients_px/0") + 30.0;
+    assert!(off_px.abs() < 0.5, "{off_px}");
+
+    // As many of another focal length.
+    let longer = directory.path().join("longer");
+    frames(&longer, &["--focal-length-mm=35", "--count=2", "--seed=5"]);
+    let (found, _) = calibrated(&[&night, &longer], &[]);
+    let left_out = found["left_out"].as_array().unwrap();
+    assert_eq!(left_out.len(), 2, "{left_out:?}");
+    assert!(
+        left_out
+            .iter()
+            .all(|left_out| left_out["code"] == "other_focal_length")
     );
 }

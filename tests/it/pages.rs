@@ -113,6 +113,22 @@ fn a_limit_has_its_budget_and_a_sweep_its_values() {
 }
 
 #[test]
+fn a_file_that_cannot_be_written_costs_neither_the_answer_nor_the_others() {
+    let directory = tempfile::tempdir().unwrap();
+    let options = ["limit", "--preset=experiment-1", "--format=json"];
+    let files = [
+        "--sweep=exposure_s=0.1:1:4",
+        "--plot=a.svg",
+        "--html=not/there.html",
+    ];
+    let ran = run(directory.path(), &[&options[..], &files].concat());
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("not/there.html"), "{}", ran.stderr);
+    assert_eq!(ran.reports().len(), 4);
+    assert_eq!(names(directory.path()), ["a.svg"]);
+}
+
+#[test]
 fn a_page_overwrites_a_page_and_nothing_else() {
     let directory = tempfile::tempdir().unwrap();
     let limit = || {

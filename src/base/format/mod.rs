@@ -4,6 +4,8 @@ mod number;
 mod rounding;
 mod sexagesimal;
 
+use std::borrow::Cow;
+
 pub use number::five_digits;
 pub(crate) use rounding::{
     decimals_for, finite, half_turn_deg, significant, to_decimals, to_significant, turn_deg,
@@ -23,6 +25,15 @@ pub fn printable(text: &str) -> String {
         }
     }
     shown
+}
+
+/// The beginning of a text that a message quotes; how long it is where it goes on.
+pub fn excerpt(text: &str) -> Cow<'_, str> {
+    const MOST: usize = 80;
+    match text.char_indices().nth(MOST) {
+        None => text.into(),
+        Some((end, _)) => format!("{}… ({} characters)", &text[..end], text.chars().count()).into(),
+    }
 }
 
 /// Whether a character is not drawn itself, but changes how others are: marks, embeddings, overrides
@@ -117,6 +128,14 @@ mod tests {
         ] {
             assert_eq!(printable(text), shown);
         }
+    }
+
+    #[test]
+    fn of_a_long_text_the_beginning_is_quoted() {
+        assert_eq!(excerpt("short"), "short");
+        let long = "ä".repeat(200_000);
+        let expected = format!("{}… (200000 characters)", "ä".repeat(80));
+        assert_eq!(excerpt(&long), expected);
     }
 
     #[test]

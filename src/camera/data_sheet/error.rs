@@ -2,6 +2,7 @@
 
 use super::response::ResponseError;
 use super::spot_image::SpotImageError;
+use crate::base::format::excerpt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,7 @@ pub enum DataSheetError {
         limit: u64,
     },
     /// The file is not valid TOML.
-    #[error("{}, line {line}: {message}", path.display())]
+    #[error("{}, line {line}: {}", path.display(), excerpt(.message))]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -36,7 +37,7 @@ pub enum DataSheetError {
         message: String,
     },
     /// An unknown key.
-    #[error("{}, line {line}: unknown key '{key}'{}", path.display(), suggestion(.nearest.as_deref()))]
+    #[error("{}, line {line}: unknown key '{}'{}", path.display(), excerpt(.key), suggestion(.nearest.as_deref()))]
     UnknownKey {
         /// The file.
         path: PathBuf,

@@ -72,6 +72,7 @@ impl LensTable {
             }
             camera = camera.limited_to(valid_to_deg * RAD_PER_DEG);
         }
+        camera.check().map_err(|error| error.to_string())?;
         let side = self.covariance.len();
         if self.covariance.iter().any(|row| row.len() != side) {
             return Err("covariance is not square".to_owned());
@@ -150,6 +151,8 @@ mod tests {
             ("[1e-10", "[-1e-10", "covariance is not that of"),
             ("mirrored = true", "mirrored = 1", "line 4"),
             ("radius_px = 640.0", "radius = 640.0", "unknown field"),
+            ("= 700.1", "= 7e8", "the focal length is 7e8 px"),
+            ("[-12.5", "[-400.0", "the distortion folds the picture"),
         ] {
             assert!(text.contains(from), "{from}: {text}");
             let error = parse(Path::new("a.toml"), &text.replace(from, to)).unwrap_err();

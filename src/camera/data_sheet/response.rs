@@ -1,6 +1,7 @@
 //! A transmission or an efficiency as a function of wavelength.
 
 use crate::base::files;
+use crate::base::format::excerpt;
 use csv::ByteRecord;
 use std::borrow::Cow;
 use std::io::Read as _;
@@ -40,7 +41,7 @@ pub enum ResponseError {
         limit: u64,
     },
     /// A row does not hold two valid numbers.
-    #[error("{}, line {line}: '{found}' where {expected} was expected", path.display())]
+    #[error("{}, line {line}: '{}' where {expected} was expected", path.display(), excerpt(.found))]
     Value {
         /// The file.
         path: PathBuf,

@@ -5,7 +5,7 @@ mod page;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files::{make_directory, write_whole};
+use super::output::files::{make_directory, write_each};
 use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
@@ -151,10 +151,8 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
         ));
     }
     let nights = summary(&archive)?;
-    if let Some(path) = &page_path {
-        let page = page::of(&archive, &nights)?;
-        write_whole(&[super::page::file(path, &page)?])?;
-    }
+    let page = page_path.map(|path| super::page::file(&path, &page::of(&archive, &nights)?));
+    let all_written = write_each(page);
     let text = match arguments.format {
         Format::Text => nights_text(&nights),
         Format::Json => json_lines(nights.iter())?,
@@ -165,5 +163,5 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
     } else {
         Exit::Failure
     };
-    Ok(Outcome { text, exit })
+    Ok(Outcome { text, exit }.if_written(all_written))
 }

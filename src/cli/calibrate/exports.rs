@@ -32,8 +32,8 @@ impl ExportOptions {
         paths.into_iter().filter_map(|path| path.as_deref())
     }
 
-    /// The files with their content.
-    pub(super) fn files(&self, measured: &LensCalibration) -> anyhow::Result<Vec<NewFile>> {
+    /// The files with their content, or why there is none.
+    pub(super) fn files(&self, measured: &LensCalibration) -> Vec<anyhow::Result<NewFile>> {
         let camera = measured.lens.camera();
         let pointing = || {
             let pointings = measured.frames.iter().map(|frame| frame.pointing);
@@ -42,19 +42,17 @@ impl ExportOptions {
         };
         let mut files = Vec::new();
         let mut add = |path: &Option<PathBuf>, text: &dyn Fn() -> anyhow::Result<String>| {
-            let Some(path) = path else {
-                return Ok(());
-            };
-            let text = text().with_context(|| format!("writing {}", path.display()))?;
-            files.push((path.clone(), text.into_bytes()));
-            anyhow::Ok(())
+            files.extend(path.as_ref().map(|path| {
+                let text = text().with_context(|| format!("writing {}", path.display()))?;
+                Ok((path.clone(), text.into_bytes()))
+            }));
         };
-        add(&self.opencv, &|| Ok(opencv_yaml(camera)?))?;
-        add(&self.ros, &|| Ok(ros_camera_info(camera, "starpipe")?))?;
-        add(&self.platepar, &|| Ok(platepar(camera, &pointing()?)?))?;
+        add(&self.opencv, &|| Ok(opencv_yaml(camera)?));
+        add(&self.ros, &|| Ok(ros_camera_info(camera, "starpipe")?));
+        add(&self.platepar, &|| Ok(platepar(camera, &pointing()?)?));
         add(&self.indi_allsky, &|| {
             Ok(indi_allsky_json(camera, &pointing()?)?)
-        })?;
-        Ok(files)
+        });
+        files
     }
 }

@@ -12,7 +12,7 @@ use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::options::frames::{FrameOptions, MemoryOption};
 use super::options::hints::HintOptions;
-use super::output::files::{NewFile, write_whole};
+use super::output::files::{NewFile, write_each};
 use super::output::messages::report_error;
 use super::output::rows::json_line;
 use super::page::HtmlOption;
@@ -92,13 +92,13 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandErro
     }
     let measured = measure(frames, left_out).map_err(anyhow::Error::from)?;
     let report = LensReport::new(&measured);
-    let page = arguments.page_path().map(|path| -> anyhow::Result<_> {
+    let page = arguments.page_path().map(|path| {
         let page = page::of(&measured, &report, unread, catalog)?;
         super::page::file(&path, &page)
     });
-    write(&arguments, &measured, page.transpose()?)?;
+    let all_written = write_each(files(&arguments, &measured, page));
     let has_failed = failed || unread > 0;
-    Ok(Outcome {
+    let outcome = Outcome {
         text: match arguments.format {
             PageFormat::Text => report.to_text(),
             PageFormat::Json => json_line(&report)?,
@@ -108,7 +108,8 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandErro
             true => Exit::Success,
             false => Exit::NotIdentified,
         },
-    })
+    };
+    Ok(outcome.if_written(all_written))
 }
 
 impl CalibrateArgs {
@@ -202,19 +203,22 @@ fn solve(
     })
 }
 
-fn write(
+/// The files that are asked for, the lens first.
+fn files(
     arguments: &CalibrateArgs,
     measured: &LensCalibration,
-    page: Option<NewFile>,
-) -> Result<(), CommandError> {
-    let mut files = arguments.exports.files(measured)?;
-    if let Some(path) = &arguments.out {
+    page: Option<anyhow::Result<NewFile>>,
+) -> Vec<anyhow::Result<NewFile>> {
+    let lens = arguments.out.as_ref().map(|path| {
         let text = lens_file::text(arguments.hints.camera.as_deref(), measured)?;
-        files.push((path.clone(), text.into_bytes()));
-    }
-    if let Some(plot) = &arguments.plot {
-        files.push(plot.with(&figure::sheet(measured))?);
-    }
-    files.extend(page);
-    Ok(write_whole(&files)?)
+        Ok((path.clone(), text.into_bytes()))
+    });
+    let plot = arguments.plot.as_ref();
+    let plot = plot.map(|plot| plot.with(&figure::sheet(measured)));
+    let exports = arguments.exports.files(measured);
+    lens.into_iter()
+        .chain(exports)
+        .chain(plot)
+        .chain(page)
+        .collect()
 }

@@ -16,10 +16,11 @@ use starpipe::study::clutter::{KindResult, Protocol, run};
 pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> {
     let kinds = &arguments.kinds.0;
     let setups = arguments.setup.setups()?;
+    let mut all_written = true;
     let tables = arguments.catalog.with_index(|pool, indexed| {
         let progress = frames_bar_with_speed(arguments.count * (setups.len() * kinds.len()) as u64);
         let done = || progress.inc(1);
-        let table = |(camera, setup): &(String, Setup)| {
+        let mut table = |(camera, setup): &(String, Setup)| {
             let protocol = Protocol {
                 setup: setup.clone(),
                 frames: arguments.count,
@@ -28,7 +29,7 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
             if let Some(directory) = &arguments.pictures {
                 let of_many = (setups.len() > 1).then(|| directory.join(camera));
                 let directory = of_many.as_ref().unwrap_or(directory);
-                pictures::write(directory, kinds, &protocol, indexed)?;
+                all_written &= pictures::write(directory, kinds, &protocol, indexed)?;
             }
             let row = |kind: &_| {
                 let row = pool.install(|| run(*kind, &protocol, indexed, &done))?;
@@ -41,12 +42,12 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
                 protocol,
             })
         };
-        let tables: Result<Vec<Table>, CommandError> = setups.iter().map(table).collect();
+        let tables: Result<Vec<Table>, CommandError> = setups.iter().map(&mut table).collect();
         progress.finish_and_clear();
         tables
     })?;
     let rows = || tables.iter().flat_map(|table| &table.rows);
-    Ok(Outcome::success(match arguments.format {
+    let outcome = Outcome::success(match arguments.format {
         Format::Text => tables
             .iter()
             .map(Table::to_text)
@@ -54,7 +55,8 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
             .join("\n"),
         Format::Json => json_lines(rows())?,
         Format::Csv => csv_table(rows())?,
-    }))
+    });
+    Ok(outcome.if_written(all_written))
 }
 
 /// The results of one camera.

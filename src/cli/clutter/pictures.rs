@@ -11,14 +11,17 @@ use std::path::Path;
 /// Frames of each kind that are written.
 const MAX_FRAMES: u64 = 20;
 
-/// Writes the first frames of each kind into `directory`, as KIND-NUMBER.tif.
+/// Writes the first frames of each kind into `directory`, as KIND-NUMBER.tif. Returns whether
+/// all are written.
 pub(super) fn write(
     directory: &Path,
     kinds: &[Kind],
     protocol: &Protocol,
     indexed: &IndexedCatalog,
-) -> Result<(), CommandError> {
+) -> Result<bool, CommandError> {
+    let mut all_written = true;
     for kind in kinds {
+        let mut files = Vec::new();
         let maker = FrameMaker::new(*kind, &protocol.setup, indexed)?;
         for number in 0..protocol.frames.min(MAX_FRAMES) {
             let made = maker.frame(protocol.seed, number)?;
@@ -33,8 +36,9 @@ pub(super) fn write(
             options.description = kind.name();
             let mut content = Cursor::new(Vec::new());
             write_tiff(&mut content, &made.frame, &options)?;
-            write_into(directory, [(name, content.into_inner())])?;
+            files.push(Ok((name, content.into_inner())));
         }
+        all_written &= write_into(directory, files);
     }
-    Ok(())
+    Ok(all_written)
 }

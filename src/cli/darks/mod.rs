@@ -10,7 +10,7 @@ use super::options::format::Format;
 use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
-use super::output::files::{NewFile, make_directory, write_whole};
+use super::output::files::{NewFile, made, make_directory, write_each};
 use super::output::messages::report_warning;
 use super::output::overwrite;
 use super::output::rows::{csv_table, json_line};
@@ -109,23 +109,21 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
     for warning in &darks.warnings {
         report_warning(warning);
     }
-    let mut results = match &arguments.out {
+    let results = match &arguments.out {
         Some(directory) => results(directory, &darks, &frames)?,
         None => Vec::new(),
     };
-    if let Some(path) = &page_path {
-        let page = page::of(&darks, unread)?;
-        results.push(super::page::file(path, &page)?);
-    }
-    write_whole(&results)?;
-    Ok(Outcome {
+    let page = page_path.map(|path| super::page::file(&path, &page::of(&darks, unread)?));
+    let all_written = write_each(results.into_iter().chain(page));
+    let outcome = Outcome {
         text: match arguments.format {
             Format::Text => darks.report().to_text(),
             Format::Json => json_line(&darks.report())?,
             Format::Csv => csv_table(darks.frame_rows())?,
         },
         exit: Exit::of(failed || unread > 0),
-    })
+    };
+    Ok(outcome.if_written(all_written))
 }
 
 impl DarksArgs {
@@ -181,13 +179,15 @@ fn results(
     directory: &Path,
     darks: &Darks,
     frames: &[PathBuf],
-) -> Result<Vec<NewFile>, CommandError> {
-    let files = files::of(darks)?.into_iter();
-    let results: Vec<NewFile> = files
-        .map(|(name, content)| (directory.join(name), content))
+) -> Result<Vec<anyhow::Result<NewFile>>, CommandError> {
+    let files = make_directory(directory).and_then(|()| files::of(darks));
+    let placed = |(name, content)| (directory.join::<String>(name), content);
+    let files = files.map(|files| files.into_iter().map(placed).collect::<Vec<NewFile>>());
+    let paths: Vec<PathBuf> = files
+        .iter()
+        .flatten()
+        .map(|(path, _)| path.clone())
         .collect();
-    let paths: Vec<_> = results.iter().map(|(path, _)| path.clone()).collect();
     overwrite::check_results(frames, &paths)?;
-    make_directory(directory)?;
-    Ok(results)
+    Ok(made(files))
 }

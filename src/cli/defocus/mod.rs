@@ -11,7 +11,7 @@ pub(crate) use args::DefocusArgs;
 
 use super::exit::{CommandError, Exit, Outcome};
 use super::options::format::Format;
-use super::output::files::{make_directory, write_whole};
+use super::output::files::{made, write_each, write_into};
 use super::output::messages::report_warning;
 use super::output::rows::{json_indented, json_line};
 use super::progress::bar;
@@ -35,21 +35,15 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     for warning in &warnings {
         report_warning(warning);
     }
-    let mut files = match &arguments.out {
-        Some(directory) => {
-            make_directory(directory)?;
-            let files = files(arguments, &report, &studies)?.into_iter();
-            files
-                .map(|(name, content)| (directory.join(name), content))
-                .collect()
-        }
-        None => Vec::new(),
-    };
-    if let Some(path) = &page_path {
+    let results = arguments
+        .out
+        .as_ref()
+        .is_none_or(|directory| write_into(directory, made(files(arguments, &report, &studies))));
+    let page = page_path.map(|path| {
         let page = page::of(arguments, &report, &studies, warnings)?;
-        files.push(crate::cli::page::file(path, &page)?);
-    }
-    write_whole(&files)?;
+        crate::cli::page::file(&path, &page)
+    });
+    let all_written = write_each(page) && results;
     let text = match arguments.format {
         Format::Text => report.to_text(),
         Format::Json => json_line(&report)?,
@@ -60,7 +54,7 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     } else {
         Exit::Unmet
     };
-    Ok(Outcome { text, exit })
+    Ok(Outcome { text, exit }.if_written(all_written))
 }
 
 /// The file of the page, if there is to be one.

@@ -9,7 +9,7 @@ pub(crate) use args::LimitArgs;
 
 use super::exit::{CommandError, Outcome};
 use super::options::format::Format;
-use super::output::files::{write_into, write_whole};
+use super::output::files::{write_each, write_into};
 use super::output::overwrite::is_same_file;
 use super::output::rows::{csv_table, json_lines};
 use anyhow::Context;
@@ -37,22 +37,23 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Outcome, CommandError> {
         .html
         .checked_path(&inputs, || page_path(arguments))?;
     let rows = rows::of(arguments, &scenario)?;
-    let mut files = Vec::new();
-    if let Some(plot) = &arguments.plot {
+    let plot = arguments.plot.as_ref().map(|plot| {
         let sweeps = arguments.sweep.iter().map(|sweep| &sweep.0);
         let sheet = figures::of_sweeps(sweeps, &scenario)?;
-        files.push(plot.with(&sheet).context("drawing the figure")?);
-    }
-    if let Some(path) = &page_path {
+        Ok::<_, CommandError>(plot.with(&sheet).context("drawing the figure"))
+    });
+    let plot = plot.transpose()?;
+    let page = page_path.map(|path| {
         let page = page::of(&rows, arguments, &scenario)?;
-        files.push(crate::cli::page::file(path, &page)?);
-    }
-    write_whole(&files)?;
-    Ok(Outcome::success(match arguments.format {
+        crate::cli::page::file(&path, &page)
+    });
+    let all_written = write_each(plot.into_iter().chain(page));
+    let outcome = Outcome::success(match arguments.format {
         Format::Text => PredictionRow::to_text(&rows),
         Format::Json => json_lines(rows.iter())?,
         Format::Csv => csv_table(rows.iter().map(PredictionRow::table_row))?,
-    }))
+    });
+    Ok(outcome.if_written(all_written))
 }
 
 /// Where the page is written if no file is named: beside the figure, if there is one.
@@ -78,7 +79,11 @@ fn check_plot(arguments: &LimitArgs) -> Result<(), CommandError> {
 
 /// Writes the eleven figures of the paper and a sheet of all of them.
 fn paper_figures(directory: &Path, scenario: &Scenario) -> Result<Outcome, CommandError> {
-    let paths = write_into(directory, figures::of_paper(scenario)?)?;
-    let lines = paths.iter().map(|path| format!("{}\n", path.display()));
-    Ok(Outcome::success(lines.collect()))
+    let files = figures::of_paper(scenario)?;
+    let lines = files
+        .iter()
+        .map(|(name, _)| format!("{}\n", directory.join(name).display()));
+    let outcome = Outcome::success(lines.collect());
+    let all_written = write_into(directory, files.into_iter().map(Ok));
+    Ok(outcome.if_written(all_written))
 }

@@ -36,17 +36,17 @@ pub(super) fn of_rows(
     rows: &[NightRow],
     summary: &NightSummary,
     station: &SkyglowStation,
-) -> anyhow::Result<Vec<NewFile>> {
-    let file = |name: &str, content: Vec<u8>| (directory.join(name), content);
+) -> Vec<anyhow::Result<NewFile>> {
+    let file = |name: &str, content: anyhow::Result<Vec<u8>>| Ok((directory.join(name), content?));
     let mut files = vec![
-        file("night.csv", csv(rows)?.into_bytes()),
-        file("night.parquet", parquet(rows)?),
-        file("night.dat", skyglow(rows, station).into_bytes()),
-        file("night.json", json_indented(summary)?.into_bytes()),
+        file("night.csv", csv(rows).map(String::into_bytes)),
+        file("night.parquet", parquet(rows)),
+        file("night.dat", Ok(skyglow(rows, station).into_bytes())),
+        file("night.json", json_indented(summary).map(String::into_bytes)),
     ];
     let figure = night::svg(rows, summary);
-    files.extend(figure.map(|figure| file("night.svg", figure.into_bytes())));
-    Ok(files)
+    files.extend(figure.map(|figure| file("night.svg", Ok(figure.into_bytes()))));
+    files
 }
 
 /// The rows as CSV.

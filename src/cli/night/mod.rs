@@ -16,7 +16,7 @@ pub(crate) use args::NightArgs;
 use super::exit::{CommandError, Exit, Outcome};
 use super::input::names::frame_names;
 use super::options::format::PageFormat;
-use super::output::files::{make_directory, write_whole};
+use super::output::files::{make_directory, write_each};
 use super::output::journal::{Journal, has_row_of};
 use super::output::messages::report_mended;
 use super::output::rows::json_line;
@@ -51,13 +51,11 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
         let dark = dark::learn(&run, &names, &start);
         let start = start.with_dark_level(dark);
         let hot = hot::learn(&run, &names, &start);
-        if let Some(pixels) = &hot {
-            let list = (
-                arguments.out.join(files::HOT_PIXELS),
-                hot::table(pixels)?.into_bytes(),
-            );
-            write_whole(&[list])?;
-        }
+        let list = hot.as_ref().map(|pixels| {
+            let path = arguments.out.join(files::HOT_PIXELS);
+            Ok((path, hot::table(pixels)?.into_bytes()))
+        });
+        let list_is_written = write_each(list);
         let masked = match &hot {
             Some(pixels) if arguments.mask_hot_pixels && !pixels.is_empty() => {
                 arguments.masked_calibration()?
@@ -70,7 +68,7 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
             hot_pixels: hot.map(|pixels| pixels.len()),
             passed_over: passed_over::counts(&passed_over, &measured.rows),
         };
-        finish(arguments, &measured, beside)
+        Ok(finish(arguments, &measured, beside)?.if_written(list_is_written))
     })
 }
 
@@ -172,13 +170,13 @@ fn finish(
     };
     let lens = start.lens.as_ref().map(|lens| lens.to_toml(&about()));
     let directory: &Path = &arguments.out;
-    let mut results = files::of_rows(directory, rows, &night, &station)?;
-    results.extend(lens.map(|lens| (directory.join(files::LENS), lens.into_bytes())));
-    if arguments.html {
+    let lens = lens.map(|lens| Ok((directory.join(files::LENS), lens.into_bytes())));
+    let page = arguments.html.then(|| {
         let page = page::of(rows, &night, &files::csv(rows)?)?;
-        results.push(super::page::file(&directory.join(files::PAGE), &page)?);
-    }
-    write_whole(&results)?;
+        super::page::file(&directory.join(files::PAGE), &page)
+    });
+    let results = files::of_rows(directory, rows, &night, &station);
+    let all_written = write_each(results.into_iter().chain(lens).chain(page));
     let exit = if night.unread > 0 {
         Exit::Failure
     } else if night.identified == 0 {
@@ -191,5 +189,5 @@ fn finish(
         PageFormat::Text => text::text(&night),
         PageFormat::Json => json_line(&night)?,
     };
-    Ok(Outcome { text, exit })
+    Ok(Outcome { text, exit }.if_written(all_written))
 }

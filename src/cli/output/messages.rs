@@ -30,9 +30,24 @@ pub(crate) fn report_mended(files: &[PathBuf]) {
 
 /// Writes one line to standard error.
 pub(crate) fn report(message: impl Display) {
-    let line = printable(&format!("starpipe: {message}"));
+    let line = line(&format!("starpipe: {message}"));
     // If standard error cannot be written, the exit status still tells of the failure.
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// What a message says, on one line that people can read: of a long one the ends.
+pub(crate) fn line(message: &str) -> String {
+    /// Longer than any that quotes paths.
+    const MOST: usize = 12_000;
+    const END: usize = 2000;
+    let count = message.chars().count();
+    if count <= MOST {
+        return printable(message);
+    }
+    let start: String = message.chars().take(MOST - END).collect();
+    let end: String = message.chars().skip(count - END).collect();
+    let left_out = count - MOST;
+    printable(&format!("{start}… ({left_out} characters) …{end}"))
 }
 
 /// An error and its causes in one line, without causes that the text before them already ends with.

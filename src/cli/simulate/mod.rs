@@ -12,7 +12,8 @@ pub(crate) use args::SimulateArgs;
 use super::batch::for_each_ordered;
 use super::exit::{CommandError, Outcome};
 use super::options::format::PageFormat;
-use super::output::files::write_whole;
+use super::output::files::{failures, write_whole};
+use super::output::messages::report_error;
 use super::output::rows::{csv_table, json_lines};
 use super::progress::frames_bar_with_speed;
 use anyhow::Context;
@@ -53,23 +54,25 @@ pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Outcome, CommandError
         limit_vmag: detector.vmag_at(0.5),
     };
     files.prepare()?;
-    let records = write_all(&generator, &files, &pool)?;
-    Ok(Outcome::success(match arguments.format {
+    let (records, all_written) = write_all(&generator, &files, &pool);
+    let outcome = Outcome::success(match arguments.format {
         PageFormat::Text => records.iter().map(FrameRecord::to_text).collect(),
         PageFormat::Json => json_lines(records.iter())?,
-    }))
+    });
+    Ok(outcome.if_written(all_written))
 }
 
-/// Simulates and writes all frames. Returns their records in order.
+/// Simulates and writes all frames; what fails is told. Returns the records of those that are written, in order,
+/// and whether all files are.
 fn write_all(
     generator: &Generator,
     files: &FrameFiles,
     pool: &rayon::ThreadPool,
-) -> anyhow::Result<Vec<FrameRecord>> {
+) -> (Vec<FrameRecord>, bool) {
     let numbers: Vec<u64> = files.numbers().collect();
     let progress = frames_bar_with_speed(numbers.len() as u64);
     let mut records = Vec::with_capacity(numbers.len());
-    let mut failed = None;
+    let mut all_written = true;
     let write = |number: &u64, (): &mut ()| write(generator, files, *number);
     for_each_ordered(
         pool,
@@ -78,24 +81,26 @@ fn write_all(
         write,
         |_, record| {
             progress.inc(1);
-            match record {
-                Ok(record) => {
-                    records.push(record);
-                    ControlFlow::Continue(())
-                }
-                Err(error) => {
-                    failed = Some(error);
-                    ControlFlow::Break(())
-                }
+            let (record, failures) = record.unwrap_or_else(|error| (None, vec![error]));
+            records.extend(record);
+            all_written &= failures.is_empty();
+            for error in &failures {
+                progress.suspend(|| report_error(error.as_ref()));
             }
+            ControlFlow::Continue(())
         },
     );
     progress.finish_and_clear();
-    failed.map_or(Ok(records), Err)
+    (records, all_written)
 }
 
-/// Simulates the frame with this number and writes it with its table.
-fn write(generator: &Generator, files: &FrameFiles, number: u64) -> anyhow::Result<FrameRecord> {
+/// Simulates the frame with this number and writes it with its table. Returns its record, if its image is
+/// written, and why files of it are not.
+fn write(
+    generator: &Generator,
+    files: &FrameFiles,
+    number: u64,
+) -> anyhow::Result<(Option<FrameRecord>, Vec<anyhow::Error>)> {
     let simulated = generator.frame(number).context("simulating a frame")?;
     let description = Description {
         generator,
@@ -105,12 +110,14 @@ fn write(generator: &Generator, files: &FrameFiles, number: u64) -> anyhow::Resu
     let truth_path = simulated.truth.as_ref().map(|_| path.with_extension("csv"));
     let image = files.encoded(&simulated.frame, &description)?;
     let record = FrameRecord::new(generator, &simulated, &path, truth_path.as_deref());
-    let mut contents = vec![(path, image)];
-    if let (Some(truth), Some(path)) = (&simulated.truth, truth_path) {
+    let written = write_whole(&path, &image);
+    let record = written.is_ok().then_some(record);
+    let table = simulated.truth.as_ref().zip(truth_path);
+    let table = table.map(|(truth, path)| {
         let (camera, pointing) = (generator.simulator.camera(), simulated.pointing.as_ref());
         let rows = truth_table(truth, camera, generator.catalog, pointing);
-        contents.push((path, csv_table(rows.into_iter())?.into_bytes()));
-    }
-    write_whole(&contents)?;
-    Ok(record)
+        Ok((path, csv_table(rows.into_iter())?.into_bytes()))
+    });
+    let failures = failures(table).into_iter().chain(written.err());
+    Ok((record, failures.collect()))
 }

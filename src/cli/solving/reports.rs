@@ -95,11 +95,11 @@ struct Reports<'a> {
     catalog: &'a Catalog,
 }
 
-/// The report of an image, and whether its files could be written.
+/// The report of an image, and why files of it could not be written.
 struct Report {
     report: FrameReport,
     row: Option<FrameRow>,
-    saved: anyhow::Result<()>,
+    failures: Vec<anyhow::Error>,
 }
 
 impl Sink for Reports<'_> {
@@ -107,11 +107,15 @@ impl Sink for Reports<'_> {
 
     fn make(&self, image: &ImageName, solved: &Solved) -> Report {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
-        let saved = self.files.save(image, solved, &report, self.catalog);
+        let failures = self.files.save(image, solved, &report, self.catalog);
         let row = self
             .needs_rows
             .then(|| FrameRow::new(&report, &solved.solution));
-        Report { report, row, saved }
+        Report {
+            report,
+            row,
+            failures,
+        }
     }
 }
 
@@ -135,10 +139,15 @@ impl Run {
         })
     }
 
-    fn take(&mut self, Report { report, row, saved }: Report) -> ControlFlow<()> {
+    fn take(&mut self, report: Report) -> ControlFlow<()> {
+        let Report {
+            report,
+            row,
+            failures,
+        } = report;
         self.tally.count(report.is_identified());
-        if let Err(error) = saved {
-            self.fail(&error);
+        for error in &failures {
+            self.fail(error);
         }
         // The bar is hidden meanwhile: results may go to the same terminal.
         let printed = self

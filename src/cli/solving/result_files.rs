@@ -3,19 +3,35 @@
 use super::images::Solved;
 use super::options::OutputOptions;
 use crate::cli::input::stdin::is_stdin;
-use crate::cli::output::files::{make_directory, remove_outdated, write_whole};
+use crate::cli::output::files::{NewFile, failures, make_directory, remove_outdated};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
 use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs};
 use starpipe::sky::catalog::Catalog;
+use std::path::{Path, PathBuf};
 
 /// Writes result files into a directory, if one is given.
 pub(super) struct ResultFiles<'a> {
     options: &'a OutputOptions,
     /// For the colors of a frame.
     memory: MemoryLimit,
+}
+
+/// An image, and what its result files are made of.
+struct Results<'a> {
+    directory: &'a Path,
+    image: &'a ImageName<'a>,
+    solved: &'a Solved,
+    report: &'a FrameReport,
+}
+
+impl Results<'_> {
+    /// The result file with this extension.
+    fn path(&self, extension: &str) -> PathBuf {
+        output_path(self.directory, self.image.path, self.image.page, extension)
+    }
 }
 
 impl<'a> ResultFiles<'a> {
@@ -25,28 +41,81 @@ impl<'a> ResultFiles<'a> {
         Ok(Self { options, memory })
     }
 
-    /// Writes the files of `image`, all or none, and removes the FITS header of an earlier run if
-    /// there is none now.
+    /// Writes the files of `image`, and removes the FITS header of an earlier run if there is none now. Returns
+    /// why some could not be made or written.
     pub(super) fn save(
         &self,
         image: &ImageName,
         solved: &Solved,
         report: &FrameReport,
         catalog: &Catalog,
-    ) -> anyhow::Result<()> {
+    ) -> Vec<anyhow::Error> {
         let OutputOptions {
             out: Some(directory),
             ..
         } = self.options
         else {
-            return Ok(());
+            return Vec::new();
         };
-        let path = |extension: &str| output_path(directory, image.path, image.page, extension);
-        let json = report.to_json_line()? + "\n";
+        let of = Results {
+            directory,
+            image,
+            solved,
+            report,
+        };
+        let header = wcs::header(&report.frame, &solved.solution);
+        let outdated = header.is_none().then(|| remove_outdated(&of.path("wcs")));
+        let header = header.map(|header| Ok((of.path("wcs"), header)));
+        let files = self.data(&of).into_iter().chain(header);
+        let files = files.chain(self.pictures(&of, catalog));
+        let checked = files.map(|file| {
+            let (path, content) = file?;
+            if image.page.is_some() {
+                // How many images an input has was not known when the others were checked.
+                overwrite::check_output(&path, &image.to_path())?;
+            }
+            Ok((path, content))
+        });
+        let mut failures = failures(checked);
+        failures.extend(outdated.and_then(Result::err));
+        failures
+    }
+
+    /// The files with numbers.
+    fn data(&self, of: &Results) -> Vec<anyhow::Result<NewFile>> {
+        let Results { solved, report, .. } = of;
+        let file = |extension: &str, text: anyhow::Result<String>| {
+            Ok((of.path(extension), text?.into_bytes()))
+        };
+        let json = report.to_json_line().map(|line| line + "\n");
         let mut files = vec![
-            (path("json"), json.into_bytes()),
-            (path("csv"), report.to_csv(true)?.into_bytes()),
+            file("json", json.map_err(Into::into)),
+            file("csv", report.to_csv(true).map_err(Into::into)),
         ];
+        for format in self.options.tables() {
+            let table = tables::stars(report, &solved.solution, format);
+            files.push(Ok((of.path(format.extension()), table)));
+        }
+        if self.options.regions {
+            files.push(file("reg", Ok(regions::ds9(report))));
+        }
+        let frame = solved.frame.as_ref();
+        if let Some(frame) = frame.filter(|_| self.options.write_fits) {
+            let copy = wcs::solved_copy(&report.frame, frame, &solved.solution, RowOrder::TopDown);
+            let copy = copy.transpose();
+            files.extend(copy.map(|copy| Ok((of.path("solved.fits"), copy?))));
+        }
+        files
+    }
+
+    /// The files to look at.
+    fn pictures(&self, of: &Results, catalog: &Catalog) -> Vec<anyhow::Result<NewFile>> {
+        let Results {
+            image,
+            solved,
+            report,
+            ..
+        } = of;
         let name = image.to_path();
         let title = name.file_name().unwrap_or(name.as_os_str());
         let title = title.to_string_lossy();
@@ -60,41 +129,17 @@ impl<'a> ResultFiles<'a> {
             shown.colors = colors.as_ref();
             shown
         });
-        if let Some(shown) = &shown {
+        let drawn = shown.as_ref().map(|shown| {
             let picture = overlay::encoded(shown, &solved.solution, catalog, &overlay)?;
-            files.push((path(overlay.format.extension()), picture));
-        }
-        if self.options.html {
+            Ok((of.path(overlay.format.extension()), picture))
+        });
+        let page = self.options.html.then(|| {
             let page = page::html(report, &solved.solution, shown.as_ref(), &overlay)?;
-            files.push((path("html"), page.into_bytes()));
-        }
-        for format in self.options.tables() {
-            let table = tables::stars(report, &solved.solution, format);
-            files.push((path(format.extension()), table));
-        }
+            Ok((of.path("html"), page.into_bytes()))
+        });
         let sky = sky_figure::svg(report);
-        files.extend(sky.map(|figure| (path("sky.svg"), figure.into_bytes())));
-        if self.options.regions {
-            files.push((path("reg"), regions::ds9(report).into_bytes()));
-        }
-        if let Some(frame) = frame.filter(|_| self.options.write_fits) {
-            let copy = wcs::solved_copy(&report.frame, frame, &solved.solution, RowOrder::TopDown)?;
-            files.extend(copy.map(|copy| (path("solved.fits"), copy)));
-        }
-        let header = wcs::header(&report.frame, &solved.solution);
-        let has_header = header.is_some();
-        files.extend(header.map(|header| (path("wcs"), header)));
-        if image.page.is_some() {
-            // How many images an input has was not known when the others were checked.
-            for (path, _) in &files {
-                overwrite::check_output(path, &image.to_path())?;
-            }
-        }
-        write_whole(&files)?;
-        if !has_header {
-            remove_outdated(&path("wcs"))?;
-        }
-        Ok(())
+        let sky = sky.map(|figure| Ok((of.path("sky.svg"), figure.into_bytes())));
+        drawn.into_iter().chain(page).chain(sky).collect()
     }
 
     /// The colors of an image, if it is the only one of a file.

@@ -17,12 +17,13 @@ pub(crate) use args::ValidateArgs;
 
 use super::exit::{CommandError, Outcome};
 use super::options::format::PageFormat;
-use super::output::files::write_whole;
+use super::output::files::write_each;
 use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use shared::Shared;
 use starpipe::report::page::{Page, Thumbnail};
 use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol, StudyRow};
+use std::cell::Cell;
 
 /// `starpipe validate`
 pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError> {
@@ -40,7 +41,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
     } as u64;
     let default = || arguments.out.join("validate.html");
     let page_path = arguments.html.checked_path(&[], default)?;
-    let text = arguments.catalog.with_index(|pool, indexed| {
+    arguments.catalog.with_index(|pool, indexed| {
         let shared = Shared {
             indexed,
             pool,
@@ -50,6 +51,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
                 .as_ref()
                 .map(|_| Thumbnail::MOST.div_ceil(runs as usize)),
             progress: frames_bar_with_speed(arguments.count * runs),
+            all_written: Cell::new(true),
         };
         let camera = &protocol.setup.scenario.camera.name;
         let (text, page): (String, Page) = if arguments.suite == Some(Suite::Sky) {
@@ -85,11 +87,11 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
             (text, page::of_study(camera, &rows, failed)?)
         };
         shared.progress.finish_and_clear();
-        if let Some(path) = &page_path {
+        let page = page_path.as_ref().map(|path| {
             let page = page::with_provenance(page, arguments.seed, indexed.catalog());
-            write_whole(&[super::page::file(path, &page)?])?;
-        }
-        Ok(text)
-    })?;
-    Ok(Outcome::success(text))
+            super::page::file(path, &page)
+        });
+        let all_written = write_each(page) && shared.all_written.get();
+        Ok(Outcome::success(text).if_written(all_written))
+    })
 }

@@ -6,9 +6,9 @@ use super::parquet::Parts;
 use super::shared::Shared;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::{remove_outdated, write_into, write_whole};
+use crate::cli::output::files::{made, remove_outdated};
 use crate::cli::output::rows::json_indented;
-use crate::cli::plot::{FigureForm, figure_files};
+use crate::cli::plot::figure_files;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
 use starpipe::study::validation::store::{
@@ -71,7 +71,7 @@ pub(super) fn run(
     }
     parts.write_all(&tables)?;
     let summary = tables.summary(validator.facts(), validator.limit_vmag())?;
-    save(directory, &summary, shared.figures)?;
+    save(directory, &summary, shared)?;
     let frames = match shared.pictures {
         Some(most) => RunFrames::of(&tables, &validator, most)?,
         None => RunFrames::default(),
@@ -108,7 +108,10 @@ fn complete(
     parts.remove_unfinished(tables)?;
     let timing = simulate(validator, tables, parts, shared)?;
     let text = json_indented(&timing)?;
-    write_whole(&[(directory.join("timing.json"), text.into_bytes())])?;
+    shared.write_into(
+        directory,
+        [Ok(("timing.json".to_owned(), text.into_bytes()))],
+    );
     shared.report(format_args!(
         "{} frames in {:.1} s, {:.1} frames a second; {:.1} ms to simulate one, {:.1} ms to process it",
         timing.frames, timing.wall_s, timing.frames_per_s, timing.simulate_ms, timing.process_ms
@@ -176,11 +179,11 @@ fn simulate_part(
 }
 
 /// Writes the summary as JSON and text, and its figures.
-fn save(directory: &Path, summary: &Summary, form: FigureForm) -> anyhow::Result<()> {
+fn save(directory: &Path, summary: &Summary, shared: &Shared) -> anyhow::Result<()> {
     let texts = [json_indented(summary)?, summary.to_text()];
     let results = RESULTS.into_iter().zip(texts);
     let results = results.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figure_files(figures::of_run(summary), form)?;
-    write_into(directory, figures.into_iter().chain(results))?;
+    let figures = made(figure_files(figures::of_run(summary), shared.figures));
+    shared.write_into(directory, results.map(Ok).chain(figures));
     Ok(())
 }

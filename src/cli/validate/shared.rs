@@ -1,10 +1,13 @@
 //! What the runs of one command have in common.
 
+use crate::cli::output::files::write_into;
 use crate::cli::output::messages::report;
 use crate::cli::plot::FigureForm;
 use indicatif::ProgressBar;
 use starpipe::identify::IndexedCatalog;
+use std::cell::Cell;
 use std::fmt::Display;
+use std::path::Path;
 
 /// What the runs of one command have in common.
 pub(super) struct Shared<'a> {
@@ -17,9 +20,21 @@ pub(super) struct Shared<'a> {
     pub(super) pictures: Option<usize>,
     /// Progress over the frames of all runs.
     pub(super) progress: ProgressBar,
+    /// Whether everything could be written so far.
+    pub(super) all_written: Cell<bool>,
 }
 
 impl Shared<'_> {
+    /// Writes files into a directory; what fails is told.
+    pub(super) fn write_into(
+        &self,
+        directory: &Path,
+        files: impl IntoIterator<Item = anyhow::Result<(String, Vec<u8>)>>,
+    ) {
+        let written = self.progress.suspend(|| write_into(directory, files));
+        self.all_written.set(self.all_written.get() && written);
+    }
+
     /// Reports something on standard error, above the progress bar if there is one.
     pub(super) fn report(&self, message: impl Display) {
         self.progress.suspend(|| report(message));

@@ -3,7 +3,7 @@
 use super::shared::Shared;
 use crate::cli::batch::for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_into;
+use crate::cli::output::files::made;
 use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::rows::{csv_table, json_indented};
 use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet, figure_files};
@@ -102,8 +102,8 @@ fn save(
         ("suite.txt", summary.to_text()),
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figure_files(vec![("sky", sheet(trials, summary))], shared.figures)?;
-    write_into(directory, figures.into_iter().chain(tables))?;
+    let figures = figure_files(vec![("sky", sheet(trials, summary))], shared.figures);
+    shared.write_into(directory, tables.into_iter().map(Ok).chain(made(figures)));
     Ok(())
 }
 

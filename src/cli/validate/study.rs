@@ -5,7 +5,7 @@ use super::shared::Shared;
 use super::sweep::StudySweep;
 use super::{figures, run};
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_into;
+use crate::cli::output::files::made;
 use crate::cli::output::rows::{csv_table, json_indented};
 use crate::cli::plot::figure_files;
 use starpipe::model::sensitivity::Spacing;
@@ -70,7 +70,7 @@ pub(super) fn run(
         ("study.csv", csv_table(rows.iter())?),
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figure_files(figures::of_study(&rows), shared.figures)?;
-    write_into(directory, figures.into_iter().chain(tables))?;
+    let figures = made(figure_files(figures::of_study(&rows), shared.figures));
+    shared.write_into(directory, tables.into_iter().map(Ok).chain(figures));
     Ok((rows, failed))
 }

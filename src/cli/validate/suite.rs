@@ -4,7 +4,6 @@ use super::frames::FailedFrames;
 use super::run;
 use super::shared::Shared;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::write_into;
 use crate::cli::output::rows::{csv_table, json_indented};
 use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol};
 use std::path::Path;
@@ -30,6 +29,6 @@ pub(super) fn run(
         ("suite.txt", HardRow::to_text(&rows)),
     ];
     let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    write_into(directory, tables)?;
+    shared.write_into(directory, tables.map(Ok));
     Ok((rows, failed))
 }

@@ -1,6 +1,7 @@
 //! The header of one header-data unit: cards of 80 bytes, in blocks of 2880.
 
 use super::error::{malformed, truncated};
+use crate::base::format::excerpt;
 use crate::frame::FrameError;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -128,7 +129,8 @@ impl<'a> Header<'a> {
     /// The error for a value of `keyword` that is not as `expected`.
     pub fn invalid(&self, keyword: &str, expected: &str) -> FrameError {
         let at = self.card(keyword).map_or(self.offset, |card| card.offset);
-        let found = self.text(keyword).unwrap_or_default();
+        let text = self.text(keyword).unwrap_or_default();
+        let found = excerpt(&text);
         malformed(format!(
             "keyword {keyword} at byte {at}: found {found}, expected {expected}"
         ))

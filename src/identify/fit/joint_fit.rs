@@ -74,6 +74,39 @@ pub(crate) fn residuals_px(
         .collect()
 }
 
+/// What the stars of a frame alone say of the lens of a joint fit.
+#[derive(Debug, Clone)]
+pub(crate) struct LensPull {
+    /// The derivative of half the misfit by its parameters, downwards.
+    pub vector: DVector<f64>,
+    /// The inverse of the covariance of its parameters.
+    pub information: DMatrix<f64>,
+}
+
+/// What each of `frames` says of the lens of their `fit`, with its attitude eliminated. `None` if a star is
+/// not imaged, or an attitude not determined.
+pub(crate) fn lens_pulls(frames: &[JointFrame], fit: &JointFit) -> Option<Vec<LensPull>> {
+    let model = fit.camera.distortion_model();
+    let parameters = fit.covariance.nrows();
+    let mut row = vec![0.0; 3 + parameters];
+    let of_frame = |(frame, attitude): (&JointFrame, &Rotation<Icrs, Camera>)| {
+        let predictor = Predictor::new(&fit.camera, attitude, model);
+        let mut vector = DVector::zeros(parameters);
+        let mut information = DMatrix::zeros(parameters, parameters);
+        let mut sums = FrameSums::new(parameters);
+        for star in &frame.stars {
+            sums.add(&predictor, star, &mut row, &mut information, &mut vector)?;
+        }
+        sums.block()?.eliminate_from(&mut information, &mut vector);
+        information.fill_upper_triangle_with_lower_triangle();
+        Some(LensPull {
+            vector,
+            information,
+        })
+    };
+    frames.iter().zip(&fit.attitudes).map(of_frame).collect()
+}
+
 /// The relative difference of the scale of a frame's stars from that of `camera`, and its standard error.
 /// `None` if the stars do not determine it.
 pub(crate) fn fit_scale(

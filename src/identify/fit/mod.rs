@@ -16,7 +16,9 @@ pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
 pub(crate) use adjustment::{Prediction, Predictor, robust_sigma_px};
 pub use camera_fit::{CameraFit, fit_camera, fit_known_lens};
 pub(crate) use growth::{Growth, Seed};
-pub(crate) use joint_fit::{JointFit, JointFrame, fit_jointly, fit_scale, residuals_px};
+pub(crate) use joint_fit::{
+    JointFit, JointFrame, fit_jointly, fit_scale, lens_pulls, residuals_px,
+};
 pub(crate) use lens_choice::{WIDE_RAD, is_affordable, least_gain, worth_a_projection};
 pub use predictions::{Predictions, predictions_by_terms};
 pub(crate) use refine::{NamingStart, Refined, Refiner, Start};

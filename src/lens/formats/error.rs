@@ -1,5 +1,8 @@
 //! Why a lens is not converted.
 
+use crate::base::format::excerpt;
+use crate::camera::ImplausibleLens;
+
 /// Why a lens cannot be written in a format, or a file is not a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -28,7 +31,7 @@ pub enum FormatError {
         expected: &'static str,
     },
     /// A line of the file cannot be read.
-    #[error("line {line} is '{found}'; expected {expected}")]
+    #[error("line {line} is '{}'; expected {expected}", excerpt(.found))]
     Syntax {
         /// The line, from 1.
         line: usize,
@@ -38,11 +41,14 @@ pub enum FormatError {
         expected: &'static str,
     },
     /// The file is not JSON.
-    #[error("expected JSON: {found}")]
+    #[error("expected JSON: {}", excerpt(.found))]
     NotJson {
         /// What the JSON reader found.
         found: String,
     },
+    /// No camera has such a lens.
+    #[error(transparent)]
+    Implausible(#[from] ImplausibleLens),
     /// An entry is missing.
     #[error("there is no '{key}'; expected {expected}")]
     Missing {
@@ -52,7 +58,7 @@ pub enum FormatError {
         expected: &'static str,
     },
     /// An entry has a value that it cannot have.
-    #[error("'{key}' is {found}; expected {expected}")]
+    #[error("'{key}' is {}; expected {expected}", excerpt(.found))]
     Value {
         /// The name of the entry.
         key: &'static str,

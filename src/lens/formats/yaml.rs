@@ -82,6 +82,9 @@ impl Document {
             let value = value.trim().trim_matches(['"', '\'']).to_owned();
             let name = key.trim().trim_matches(['"', '\'']).to_lowercase();
             if !key.starts_with([' ', '\t', '-']) {
+                if entries.iter().any(|entry| entry.key == name) {
+                    return Err(syntax(index, raw, "a name that no line before it has"));
+                }
                 entries.push(Entry {
                     line: index,
                     key: name,
@@ -234,6 +237,10 @@ mod tests {
             (
                 "m:\n  rows: 2\n  cols: 2\n  data: [1]",
                 "'m' is 1 numbers for 2 rows, 2 columns; expected one number for each row and column",
+            ),
+            (
+                "m: [1]\nn: 1\nM: [2]",
+                "line 3 is 'M: [2]'; expected a name that no line before it has",
             ),
             (
                 "n: 1",

@@ -1,6 +1,7 @@
 //! Errors of catalogue files.
 
 use super::StarId;
+use crate::base::format::excerpt;
 use std::path::{Path, PathBuf};
 use std::{fmt, io};
 
@@ -57,9 +58,10 @@ pub enum CatalogError {
     },
     /// A table lacks required columns.
     #[error(
-        "{}, line {line}: the table has no column {}; found {found}",
+        "{}, line {line}: the table has no column {}; found {}",
         path.display(),
-        missing.join(", ")
+        missing.join(", "),
+        excerpt(.found)
     )]
     MissingColumns {
         /// The file.

@@ -18,6 +18,7 @@ pub use refraction::Air;
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
+use crate::base::format::excerpt;
 use crate::base::units::RAD_PER_DEG;
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -54,8 +55,9 @@ pub(crate) fn earth_velocity_c(years: f64) -> Vector3<f64> {
 pub enum SiteError {
     /// The text is not two or three numbers.
     #[error(
-        "'{text}' is no site; expected latitude and longitude in degrees and, where known, the \
-         height in metres, with commas between them, like 52.22,4.42,3"
+        "'{}' is no site; expected latitude and longitude in degrees and, where known, the \
+         height in metres, with commas between them, like 52.22,4.42,3",
+        excerpt(.text)
     )]
     Malformed {
         /// The text.

@@ -6,8 +6,8 @@ use super::super::fit::{Guess, Sample, camera_like};
 use super::super::yaml::{Document, Matrix};
 use super::{CvLens, CvModel};
 use crate::CameraModel;
-use crate::base::units::RAD_PER_DEG;
-use crate::camera::{Distortion, DistortionModel, Projection};
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::camera::{Distortion, DistortionModel, ImplausibleLens, Projection};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -16,7 +16,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// `image_width`, `image_height`, `camera_matrix` and `distortion_coefficients` are read, and
 /// `distortion_model`: `plumb_bob`, `rational_polynomial` or `equidistant` (`cv::fisheye`). Without a
 /// model the lens is a pinhole, unless `fisheye_model` is 1. `valid_to_deg` is read, too; without it
-/// lenses are known up to 90° from the axis, or to where their image folds.
+/// lenses are known up to 90° from the axis. Lenses that no camera has are refused: an image that folds on
+/// the frame, an axis beside it, focal lengths along rows and columns that differ by more than 25 %.
 ///
 /// k₁ to k₃, p₁, p₂ and s₁ to s₄ of pinholes, and k₁ to k₃ of `cv::fisheye`, are taken over exactly. With
 /// k₄ and more the lens of some ideal projection is fitted.
@@ -76,9 +77,18 @@ fn lens_of(document: &Document) -> Result<CvLens, FormatError> {
             expected: "an angle up to 180 degrees",
         });
     }
+    let [width_px, height_px] = [size(&["image_width"])?, size(&["image_height"])?];
+    let [x, y] = centre_px;
+    if !(-0.5..=width_px).contains(&x) || !(-0.5..=height_px).contains(&y) {
+        return Err(FormatError::Value {
+            key: "camera_matrix",
+            found: format!("for an axis at ({x}, {y}) px"),
+            expected: "one on the frame of image_width and image_height",
+        });
+    }
     Ok(CvLens {
-        width_px: size(&["image_width"])?,
-        height_px: size(&["image_height"])?,
+        width_px,
+        height_px,
         focal_px,
         centre_px,
         model,
@@ -154,9 +164,11 @@ fn camera_of(lens: &CvLens, tolerance_px: f64) -> Result<CameraModel, FormatErro
     };
     let exact = exact_camera(lens);
     if is_exact {
+        exact.check()?;
         return Ok(exact);
     }
-    let seen_to_rad = seen_to_rad(lens);
+    exact.check_frame()?;
+    check_fold(lens)?;
     let camera = CameraModel::pinhole(
         lens.width_px,
         lens.height_px,
@@ -164,14 +176,14 @@ fn camera_of(lens: &CvLens, tolerance_px: f64) -> Result<CameraModel, FormatErro
         exact.mirrored,
     )
     .with_projection(Projection::Equidistant)
-    .limited_to(seen_to_rad.unwrap_or(lens.max_angle_rad));
+    .limited_to(lens.max_angle_rad);
     let distortion = exact.distortion();
     let guess = Guess {
         camera,
         axis_px: distortion.map_or([0.0; 2], |d| d.axis_offset_px()),
         stretch_px: distortion.map_or(0.0, |d| d.coefficients_px().get(7).copied().unwrap_or(0.0)),
     };
-    let to_rad = seen_to_rad.unwrap_or_else(|| farthest_rad(lens));
+    let to_rad = farthest_rad(lens);
     let [fitted, checked] = [(31, 24), (71, 45)].map(|points| polar_samples(lens, to_rad, points));
     let kinds = |projections: &[Projection]| -> Vec<_> {
         let kind = |projection: &Projection| (*projection, DistortionModel::Stretched);
@@ -261,21 +273,26 @@ fn exact_camera(lens: &CvLens) -> CameraModel {
     lens_camera.limited_to(lens.max_angle_rad)
 }
 
-/// The angle from the axis at which the image of the lens folds, if it does so before the frame's corners.
-fn seen_to_rad(lens: &CvLens) -> Option<f64> {
+/// Refuses a lens whose image folds before the frame's corners.
+fn check_fold(lens: &CvLens) -> Result<(), ImplausibleLens> {
     let corner = farthest_radius(lens);
-    let mut last = 0.0;
+    let mut last = [0.0, 0.0];
     for angle_rad in angles(lens) {
         let radius = lens.radius(angle_rad);
-        if radius.is_nan() || radius <= last {
-            return Some(angle_rad);
+        if radius.is_nan() || radius <= last[1] {
+            let [last_rad, last_radius] = last;
+            return Err(ImplausibleLens::Fold {
+                angle_deg: last_rad * DEG_PER_RAD,
+                x_px: lens.centre_px[0] + last_radius * lens.focal_px[0].abs(),
+                y_px: lens.centre_px[1],
+            });
         }
         if radius > corner {
-            return None;
+            return Ok(());
         }
-        last = radius;
+        last = [angle_rad, radius];
     }
-    None
+    Ok(())
 }
 
 /// The angle from the axis of the farthest corner.

@@ -152,7 +152,7 @@ fn a_fisheye_is_that_of_opencv() {
 #[test]
 fn a_lens_that_cannot_be_taken_over_is_refused_with_its_error() {
     let lens = [400.0, 400.0, 640.0, 480.0];
-    let text = yaml("equidistant", lens, &[0.01, -0.02, 0.02, -0.02]);
+    let text = yaml("equidistant", lens, &[0.01, -0.02, 0.02, -0.005]);
     let error = from_opencv_yaml(&text).unwrap_err();
     assert!(matches!(error, FormatError::TooFarOff { .. }), "{error}");
     assert!(from_opencv_yaml_within(&text, 10.0).is_ok());
@@ -270,10 +270,42 @@ fn other_files_are_refused() {
         ("1095", "-1095", "fy above 0"),
         ("camera_matrix", "matrix", "there is no 'camera_matrix'"),
         ("470.25", "nan", "'nan'; expected numbers"),
+        ("1100, 0.", "1e308, 0.", "the focal length is"),
+        (
+            "1095",
+            "547",
+            "as 2.011 to 1; expected pixels that are square",
+        ),
+        (
+            "645.5",
+            "1645.5",
+            "for an axis at (1645.5, 470.25) px; expected one on the frame",
+        ),
+        (
+            "[0.0, 0.0, 0.0, 0.0, 0.0]",
+            "[-50., 300., 0., 0., -900.]",
+            "folds the picture",
+        ),
     ] {
         let error = from_opencv_yaml(&good.replace(from, to))
             .unwrap_err()
             .to_string();
         assert!(error.contains(expected), "{error}");
     }
+    let folded = [-2.0, 1.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0];
+    let folded = yaml(
+        "rational_polynomial",
+        [1100.0, 1095.0, 645.5, 470.25],
+        &folded,
+    );
+    let error = from_opencv_yaml(&folded).unwrap_err();
+    assert!(error.to_string().contains("folds the picture"), "{error}");
+    assert!(from_opencv_yaml(&format!("{folded}valid_to_deg: 15\n")).is_ok());
+    let long = format!("{good}{}\n", "x".repeat(200_000));
+    let error = from_opencv_yaml(&long).unwrap_err().to_string();
+    assert!(
+        error.starts_with("line ") && error.len() < 200,
+        "{}",
+        error.len()
+    );
 }

@@ -50,8 +50,11 @@ pub fn from_platepar_within(
         Kind::Radial { terms, all_powers } => terms <= 3 && !all_powers && left.asymmetry,
         Kind::Polynomial { .. } => false,
     };
+    let exact = plate.exact_camera();
+    exact.check_frame()?;
+    plate.check_fold()?;
     let (camera, turn) = if is_exact {
-        (plate.exact_camera(), Matrix3::identity())
+        (exact, Matrix3::identity())
     } else {
         plate.fitted_camera(tolerance_px)?
     };
@@ -233,6 +236,27 @@ impl Plate {
         terms_px[7] = (along_x_px - along_y_px) / (2.0 * focal_px) * radius_px;
         let distortion = Distortion::new(DistortionModel::Stretched, radius_px, &terms_px);
         camera.with_distortion(Some(distortion))
+    }
+
+    /// Refuses a plate whose image folds within the circle that touches the nearest borders: what is farther
+    /// out may be dark.
+    fn check_fold(&self) -> Result<(), FormatError> {
+        const POINTS: usize = 25;
+        let [width_px, height_px] = self.size_px;
+        let [half_x, half_y] = [0.5 * width_px, 0.5 * height_px];
+        let nearest_px = half_x.min(half_y);
+        let folded = grid(width_px, height_px, POINTS).find(|[x, y]| {
+            let offset = [x - half_x, y - half_y];
+            libm::hypot(offset[0], offset[1]) < nearest_px && self.inverted(offset).is_none()
+        });
+        let Some([x, y]) = folded else {
+            return Ok(());
+        };
+        Err(FormatError::Value {
+            key: "x_poly_rev",
+            found: format!("a distortion that images nothing at ({x:.0}, {y:.0}) px"),
+            expected: "one that does not fold the picture",
+        })
     }
 
     /// The camera that is most like the plate, and how it is turned against the plate's reference.
