@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ._result import Result
+    from ._tables import Columns
 
 Rings = Literal["named", "all", "none"]
 
@@ -24,6 +25,11 @@ MARKS: dict[str, tuple[str, dict[str, Any]]] = {
     "not a star": ("x", {"color": "#c878be"}),
 }
 """Forms and colors of marks, as in the program's overlays."""
+
+
+def printable(text: str) -> str:
+    """Return a text with the characters escaped that change how others are drawn."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def draw(
@@ -55,7 +61,10 @@ def draw(
         ax.set_xlabel("x (px)")
         ax.set_ylabel("y (px)")
     title = repr(result).strip("<>").removeprefix("Result ")
-    ax.set_title(title.replace(result._name, os.path.basename(result._name), 1), fontsize=8)
+    name = printable(result._name)
+    title = title.replace(name, printable(os.path.basename(result._name)), 1)
+    # Dollars in a name are no formula.
+    ax.set_title(title, fontsize=8, parse_math=False)
     return ax
 
 
@@ -68,11 +77,26 @@ def _show(ax: Axes, levels: NDArray[np.uint8], shape: tuple[int, int]) -> None:
     ax.imshow(levels, extent=(-0.5, columns, -0.5, rows), origin="lower")
 
 
+def _called(stars: Columns) -> NDArray[np.str_]:
+    """Return what the program's overlays call each star: its name, or else a number."""
+
+    def called(name: str, hd: float, hip: float, identifier: str) -> str:
+        numbers = (("HD", hd), ("HIP", hip))
+        known = [f"{catalog} {number:.0f}" for catalog, number in numbers if number > 0]
+        return name or (known or [identifier])[0]
+
+    columns = (stars[name] for name in ("name", "hd", "hip", "id"))
+    return np.array([called(*star) for star in zip(*columns, strict=True)], dtype=np.str_)
+
+
 def _mark(ax: Axes, result: Result, rings: Rings, names: int) -> None:
     from matplotlib.patheffects import withStroke
 
     stars = result.star_columns
-    named = np.flatnonzero(stars["name"] != "")[:names]
+    called = _called(stars)
+    # The brightest first.
+    with_name, with_number = stars["name"] != "", (called != "") & (stars["name"] == "")
+    named = np.concatenate([np.flatnonzero(with_name), np.flatnonzero(with_number)])[:names]
     is_known = (stars["id"] != "") | (stars["name"] != "")
     unlike = [any(flag in UNLIKE_STARS for flag in flags.split()) for flags in stars["flags"]]
     is_marked = np.full(len(is_known), rings != "none")
@@ -96,7 +120,7 @@ def _mark(ax: Axes, result: Result, rings: Rings, names: int) -> None:
         # Names lie towards the middle where the picture ends.
         is_left, is_below = x > 0.85 * columns, from_top < 0.06 * rows
         ax.annotate(
-            str(stars["name"][index]),
+            printable(str(called[index])),
             (x, y),
             xytext=(-6 if is_left else 6, -6 if is_below else 6),
             textcoords="offset points",
@@ -105,5 +129,6 @@ def _mark(ax: Axes, result: Result, rings: Rings, names: int) -> None:
             color="#b6e6ff",
             fontsize=8,
             clip_on=True,
+            parse_math=False,
             path_effects=outline,
         )

@@ -16,11 +16,13 @@ from ._attitude import ARCSEC_PER_RAD, Attitude, quantity
 from ._camera import PathLike
 from ._images import Image, ImageLike, Input
 from ._measured import Distortion, Limit, Match
+from ._plot import printable
 
 if TYPE_CHECKING:
     from astropy.coordinates import SkyCoord
     from astropy.io.fits import Header
     from astropy.table import QTable
+    from astropy.table import Table as PlainTable
     from astropy.units import Quantity
     from astropy.wcs import WCS
     from matplotlib.axes import Axes
@@ -126,9 +128,9 @@ class Result(Attitude):
 
     def __repr__(self) -> str:
         report = self._report
-        name = report["frame"]
+        name = printable(report["frame"])
         if self.error is not None:
-            return f"<Result {name}: {type(self.error).__name__}: {self.error}>"
+            return f"<Result {name}: {type(self.error).__name__}: {printable(str(self.error))}>"
         if not self:
             return f"<Result {name}: not identified ({self.reason_code})>"
         attitude, match = report["attitude"], report["match"]
@@ -153,7 +155,7 @@ class Result(Attitude):
             rows += [("not identified", str(self.reason))]
         rows += [("note", note) for note in self.notes]
         cells = "".join(
-            f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            f"<tr><th>{html.escape(name)}</th><td>{html.escape(printable(value))}</td></tr>"
             for name, value in rows
         )
         return f"<div>{self._overlay()}<table>{cells}</table></div>"
@@ -174,7 +176,7 @@ class Result(Attitude):
             marks.append(f'<circle {place} fill="none" stroke="{color}"/>')
         for star in [star for star in stars if star["name"]][:8]:
             place = f'x="{star["x"] + 8 * pixel:.1f}" y="{star["y"]:.1f}"'
-            labels.append(f"<text {place}>{html.escape(star['name'])}</text>")
+            labels.append(f"<text {place}>{html.escape(printable(star['name']))}</text>")
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" width="360" viewBox="0 0 {width} {height}" '
             f'stroke-width="{pixel:.2f}"><rect width="100%" height="100%" fill="#222"/>'
@@ -323,9 +325,20 @@ class Result(Attitude):
 
     @property
     def stars(self) -> QTable:
-        """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`."""
+        """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`.
+
+        Cells have units. Where numbers are wanted, as in ``float(row["x"])``, use `plain_stars`.
+        """
+        return self._star_table(plain=False)
+
+    @property
+    def plain_stars(self) -> PlainTable:
+        """The same as `stars` as a ``Table``, whose cells are numbers; units are of its columns."""
+        return self._star_table(plain=True)
+
+    def _star_table(self, *, plain: bool) -> Any:
         columns = self.star_columns
-        table = _tables.star_table(columns)
+        table = _tables.star_table(columns, plain=plain)
         if table is not columns:
             table.meta["frame"] = self._report["frame"]
         return table
@@ -373,7 +386,8 @@ class Result(Attitude):
             identified; all; or none. A circle is identified, a square is not, a cross is not
             shaped like a star.
         names : int
-            How many of the brightest stars with a name get it.
+            How many stars get their name: the brightest with a name, and then the brightest others
+            with their number in a catalogue.
 
         Returns
         -------

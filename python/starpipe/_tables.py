@@ -33,12 +33,13 @@ def star_columns(stars: list[dict[str, Any]]) -> Columns:
     return {name: values(name, kind) for name, (kind, *_) in STAR_COLUMNS.items()}
 
 
-def star_table(named: Columns) -> Any:
+def star_table(named: Columns, *, plain: bool = False) -> Any:
     """Return columns of stars as a ``QTable`` with units, UCDs and descriptions.
 
-    Without astropy they are returned as they are.
+    With `plain` as a ``Table``, whose cells are numbers. Without astropy they are returned as they
+    are.
     """
-    found = table(named, {name: STAR_COLUMNS[name][1] for name in named})
+    found = table(named, {name: STAR_COLUMNS[name][1] for name in named}, plain=plain)
     if found is not named:
         for name in found.colnames:
             _, _, ucd, found[name].info.description = STAR_COLUMNS[name]
@@ -60,13 +61,13 @@ def _column(values: list[Any]) -> NDArray[Any]:
     return np.array(values)
 
 
-def table(named: Columns, units: dict[str, str]) -> Any:
-    """Return columns as a ``QTable``; without astropy as they are."""
+def table(named: Columns, units: dict[str, str], *, plain: bool = False) -> Any:
+    """Return columns as a ``QTable``, or a plain ``Table``; without astropy as they are."""
     try:
-        from astropy.table import QTable
+        from astropy.table import QTable, Table
     except ImportError:
         return named
-    found = QTable(named)
+    found = Table(named) if plain else QTable(named)
     for name, unit in units.items():
         if unit and name in found.colnames:
             found[name].unit = unit

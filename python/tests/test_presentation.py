@@ -48,6 +48,38 @@ def test_a_plot_has_the_photograph_its_stars_and_their_names(result, pixels):
     axes.figure.canvas.draw()
 
 
+def test_stars_without_a_name_have_their_number(result):
+    stars = result.star_columns
+    all_names = np.sum(stars["name"] != "")
+    axes = result.plot(names=10_000)
+    texts = [text.get_text() for text in axes.texts]
+    assert len(texts) == np.sum((stars["id"] != "") | (stars["name"] != "")) > all_names
+    others = np.flatnonzero((stars["id"] != "") & (stars["name"] == ""))
+    first = others[0]
+    hd, hip = stars["hd"][first], stars["hip"][first]
+    expected = f"HD {hd:.0f}" if hd > 0 else f"HIP {hip:.0f}" if hip > 0 else stars["id"][first]
+    assert texts[all_names] == expected
+    axes.figure.canvas.draw()
+
+
+def test_a_name_of_a_file_is_text(result, pixels):
+    names = "a\n\t\x1b[31m\u202e$\\frac$<b>.tif"
+    odd = type(result)(result.__getstate__())
+    odd._report["frame"] = names
+    for shown in (repr(odd), odd._repr_html_(), odd.plot(image=pixels).get_title()):
+        assert not set(names) & set("\n\t\x1b\u202e") & set(shown), shown
+        assert "\\u202e$\\frac$" in shown
+    assert "<b>" not in odd._repr_html_()
+    matplotlib.pyplot.gcf().canvas.draw()
+
+
+def test_a_plain_table_has_numbers(result):
+    plain = result.plain_stars
+    assert plain.colnames == result.stars.colnames and str(plain["x"].unit) == "pix"
+    row, with_units = plain[0], result.stars[0]
+    assert float(row["x"]) == with_units["x"].value and plain.meta == result.stars.meta
+
+
 def test_a_plot_marks_what_is_wanted(result, pipeline):
     assert rings_of(result.plot(rings="all")) == len(result.stars)
     assert rings_of(result.plot(rings="none")) == 0

@@ -95,6 +95,9 @@ pub struct Detections {
     pub trails: Option<StarTrails>,
     /// Light beyond the fitted spots, which is in the fluxes; `None` where it is not significant.
     pub wings: Option<Wings>,
+    /// Standard error that all fluxes have in common, relative to them: of the wings, and of what of them may
+    /// be missed.
+    pub(crate) flux_scale_sigma: f64,
     /// Why the rate of false detections asked for is held less well than in independent noise.
     pub noise_tail: Option<NoiseTail>,
     /// Whether fainter sources were left out, since there are more than
@@ -161,7 +164,8 @@ pub struct StarTrails {
     pub middle_sigma_px: f64,
 }
 
-/// Light of the stars beyond the spots that are fitted to them.
+/// Light of the stars that the spots fitted to them do not have: beyond them, or less than theirs where `share`
+/// is below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Wings {

@@ -295,7 +295,8 @@ fn add_wings(view: &View<'_>, background: &Mesh, found: &mut Detections) {
         .psf
         .map_or(found.spot_sigma_px, |psf| psf.sigma_range_px[1]);
     let width_px = (widest.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
-    found.wings = measure_wings(view, background, &found.sources, width_px);
+    let scale = measure_wings(view, background, &found.sources, width_px);
+    (found.wings, found.flux_scale_sigma) = (scale.wings, scale.sigma);
     if let Some(wings) = found.wings {
         for source in found.sources.iter_mut() {
             source.flux_adu *= 1.0 + wings.share;

@@ -1,64 +1,150 @@
-//! The wings of the stars: light beyond the spots that are fitted to them.
+//! The light of the stars that their fitted spots do not tell: the wings.
 //!
-//! Bright isolated stars, their light within eight standard deviations of the spot, over that of
-//! the fit → [`Wings`]
+//! Bright stars, their light within rings over that of the fit → [`FluxScale`]
 //!
-//! A fit reaches to where a Gaussian ends. Turbulence, diffraction and scattered light put some
-//! percent of a star's light farther out, which no fit of its core can tell. The correction is the
-//! same for all stars of a frame, as in aperture photometry (Howell 1989, PASP 101, 616).
+//! A fit reaches to where a Gaussian ends. Turbulence, diffraction and scattered light put some percent of a
+//! star's light farther out, which no fit of its core can tell. Spots with sharp edges, as of stars out of focus,
+//! have less light than a Gaussian that is fitted to them. The correction is the same for all stars of a frame,
+//! as in aperture photometry (Howell 1989, PASP 101, 616).
+//!
+//! 1. The light within four standard deviations of the spot is summed up, where a Gaussian ends, and that in three
+//!    rings beyond, each twice as large as the one before.
+//! 2. The light beyond a distance r is taken to fall as A r⁻ᵖ: p = 1 for diffraction, 5/3 for turbulence
+//!    (Racine 1996, PASP 108, 699), 2β − 2 for Moffat's profile. The rings tell A, and p as far as they can; what
+//!    they leave open is in the standard error.
+//! 3. Most frames have no wings, so that half of the probability is that of none before anything is measured.
 
 use super::background::Mesh;
 use super::detection::{Detection, Wings};
 use super::pixels::View;
-use crate::base::statistics::SIGMA_PER_MAD;
+use crate::base::coords::PixelPoint;
+use crate::base::statistics::{Estimate, SIGMA_PER_MAD, normal_density};
+use arrayvec::ArrayVec;
 
-/// Radius of the aperture, in standard deviations of the spot, …
-const APERTURE_SIGMAS: f64 = 8.0;
-/// … and the distance of other sources from its edge.
+/// The core and the rings.
+const PARTS: usize = 4;
+/// Radius at which each of them ends, in standard deviations of the spot.
+const ENDS_SIGMAS: [f64; PARTS] = [4.0, 5.657, 8.0, 11.314];
+/// Distance of other sources from the edge of the core, in standard deviations; nearer to them than this, pixels of
+/// rings do not count.
 const MARGIN_SIGMAS: f64 = 3.0;
+/// Share of the pixels of a ring that must count.
+const MIN_SEEN: f64 = 0.4;
 /// Signal-to-noise ratio of stars that count, and the largest number of them.
 const MIN_SNR: f64 = 10.0;
 const MAX_STARS: usize = 60;
 const MIN_STARS: usize = 3;
+/// Most other sources near a star.
+const MAX_OTHERS: usize = 16;
 /// Smallest share of the light that is corrected: below, the spot is as good as its model.
 const MIN_SHARE: f64 = 0.02;
-/// Its significance, as a normal deviate.
-const SIGNIFICANT_SIGMAS: f64 = 5.0;
+/// Shares of the light that wings may have, all as likely before they are measured.
+const LIKELY_SHARES: [f64; 2] = [-0.05, 0.20];
 /// Stars farther than this many standard errors from the median do not count.
 const CLIP_SIGMAS: f64 = 3.0;
 
-/// The share of a star's light that its fit lacks, and its standard error.
-#[derive(Debug, Clone, Copy, Default)]
-struct StarWings {
-    share: f64,
-    sigma: f64,
+/// What is common to all fluxes of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct FluxScale {
+    /// The wings, where there are any.
+    pub wings: Option<Wings>,
+    /// Standard error that all fluxes have in common, relative to them.
+    pub sigma: f64,
 }
 
-/// Measures the wings on the brightest of `sources`, which are sorted, brightest first; `None` where
-/// they are not significant. `spot_width_px` is the standard deviation of the widest spots, pixel
-/// included.
-pub(crate) fn measure_wings(
+/// Measures the wings on the brightest of `sources`, which are sorted, brightest first. `spot_width_px` is the
+/// standard deviation of the widest spots, pixel included.
+pub(super) fn measure_wings(
     view: &View<'_>,
     background: &Mesh,
     sources: &[Detection],
     spot_width_px: f64,
-) -> Option<Wings> {
-    let radius_px = APERTURE_SIGMAS * spot_width_px;
-    let apart_px = radius_px + MARGIN_SIGMAS * spot_width_px;
-    let mut stars = [StarWings::default(); MAX_STARS];
-    let measured = sources
-        .iter()
-        .filter(|source| is_clean(source))
-        .filter(|source| is_alone(source, sources, apart_px))
-        .filter_map(|source| star_wings(view, background, source, radius_px));
-    let mut count = 0;
-    for (place, star) in stars.iter_mut().zip(measured) {
-        *place = star;
-        count += 1;
+) -> FluxScale {
+    let field = Field {
+        view,
+        background,
+        sources,
+        ends_px: ENDS_SIGMAS.map(|end| end * spot_width_px),
+        margin_px: MARGIN_SIGMAS * spot_width_px,
+    };
+    let bright = sources.iter().filter(|source| is_clean(source));
+    let measured = bright.filter_map(|source| field.light_around(source));
+    let stars: ArrayVec<[Estimate; PARTS], MAX_STARS> = measured.take(MAX_STARS).collect();
+    let of_part = |part: usize| mean(stars.iter().map(|star| star[part]).collect());
+    let rings: ArrayVec<Estimate, PARTS> = (1..PARTS).map_while(of_part).collect();
+    let (Some(core), Some(beyond)) = (of_part(0), beyond(&rings)) else {
+        return FluxScale::default();
+    };
+    FluxScale::of(&Estimate {
+        value: core.value - 1.0 + beyond.value,
+        sigma: libm::hypot(core.sigma, beyond.sigma),
+    })
+}
+
+impl FluxScale {
+    /// That of a frame whose spots lack this share of the light of the fitted ones.
+    fn of(lacking: &Estimate) -> Self {
+        let Estimate { value, sigma } = *lacking;
+        let [least, most] = LIKELY_SHARES;
+        // The densities of what was measured, without wings and with any.
+        let without = normal_density(value / sigma) / sigma;
+        let with = 1.0 / (most - least);
+        let is_likely = with > without;
+        if is_likely && value.abs() > MIN_SHARE {
+            return Self {
+                wings: Some(Wings {
+                    share: value,
+                    sigma,
+                }),
+                sigma: sigma / (1.0 + value),
+            };
+        }
+        let probability = with / (with + without);
+        Self {
+            wings: None,
+            sigma: (probability * (value * value + sigma * sigma)).sqrt(),
+        }
     }
-    let wings = mean(&mut stars[..count])?;
-    let is_large = wings.share > MIN_SHARE.max(SIGNIFICANT_SIGMAS * wings.sigma);
-    is_large.then_some(wings)
+}
+
+/// The light beyond the core by that in the rings, from the innermost on: the mean over all exponents p, each as
+/// likely as the rings leave it.
+fn beyond(rings: &[Estimate]) -> Option<Estimate> {
+    /// The exponents, in quarters.
+    const QUARTERS: std::ops::RangeInclusive<u32> = 4..=16;
+    let fits = || {
+        QUARTERS.map(|quarters| {
+            let part_beyond =
+                |end: f64| libm::pow(end / ENDS_SIGMAS[0], -0.25 * f64::from(quarters));
+            let ends = ENDS_SIGMAS.windows(2);
+            let parts = ends.map(|ends| part_beyond(ends[0]) - part_beyond(ends[1]));
+            amplitude(rings.iter().zip(parts))
+        })
+    };
+    let best = fits().map(|(_, chi2)| chi2).reduce(f64::min)?;
+    let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for (Estimate { value, sigma }, chi2) in fits() {
+        let weight = libm::exp(-0.5 * (chi2 - best));
+        weights += weight;
+        sum += weight * value;
+        squares += weight * (value * value + sigma * sigma);
+    }
+    let value = sum / weights;
+    let sigma = (squares / weights - value * value).max(0.0).sqrt();
+    value.is_finite().then_some(Estimate { value, sigma })
+}
+
+/// The factor of `parts` that fits what was measured best, and its chi².
+fn amplitude<'a>(measured: impl Iterator<Item = (&'a Estimate, f64)> + Clone) -> (Estimate, f64) {
+    let (mut information, mut product) = (0.0, 0.0);
+    for (ring, part) in measured.clone() {
+        information += (part / ring.sigma).powi(2);
+        product += part * ring.value / ring.sigma.powi(2);
+    }
+    let value = product / information;
+    let off = measured.map(|(ring, part)| ((ring.value - value * part) / ring.sigma).powi(2));
+    let sigma = information.sqrt().recip();
+    (Estimate { value, sigma }, off.sum())
 }
 
 /// Whether it is bright and whole.
@@ -67,70 +153,122 @@ fn is_clean(source: &Detection) -> bool {
     flags.has_clean_flux() && flags.is_star_like() && source.snr >= MIN_SNR
 }
 
-fn is_alone(source: &Detection, sources: &[Detection], apart_px: f64) -> bool {
-    let at = source.position;
-    let near = |other: &&Detection| {
-        let (dx, dy) = (other.position.x - at.x, other.position.y - at.y);
-        dx * dx + dy * dy < apart_px * apart_px
-    };
-    // The source itself is one of them.
-    sources.iter().filter(near).nth(1).is_none()
+/// A frame with its sources.
+struct Field<'a> {
+    view: &'a View<'a>,
+    background: &'a Mesh,
+    sources: &'a [Detection],
+    /// Radius at which the core and each ring ends, in pixels.
+    ends_px: [f64; PARTS],
+    margin_px: f64,
 }
 
-/// Light within `radius_px` of a star over that of its fit; `None` at the frame's border and over
-/// masked pixels.
-fn star_wings(
-    view: &View<'_>,
-    background: &Mesh,
-    source: &Detection,
-    radius_px: f64,
-) -> Option<StarWings> {
-    let at = source.position;
-    let (level, noise) = background.at(at.x as f32, at.y as f32);
-    let first = |center: f64| (center - radius_px).ceil();
-    let last = |center: f64| (center + radius_px).floor();
-    let is_inside = first(at.x) >= 0.0
-        && first(at.y) >= 0.0
-        && last(at.x) < view.width as f64
-        && last(at.y) < view.height as f64;
-    if !is_inside {
-        return None;
-    }
-    let (mut light, mut pixels) = (0.0, 0_u32);
-    for y in first(at.y) as usize..=last(at.y) as usize {
-        for x in first(at.x) as usize..=last(at.x) as usize {
-            let (dx, dy) = (x as f64 - at.x, y as f64 - at.y);
-            if dx * dx + dy * dy <= radius_px * radius_px {
-                light += f64::from(view.at(x, y) - level);
-                pixels += 1;
+impl Field<'_> {
+    /// Light in the core and in the rings around a star, over that of its fit; `None` at the frame's border and
+    /// where others are near.
+    fn light_around(&self, star: &Detection) -> Option<[Estimate; PARTS]> {
+        let at = star.position;
+        let [columns, rows] = self.box_around(&at)?;
+        if self.others(&at, self.ends_px[0]).next().is_some() {
+            return None;
+        }
+        let mut others: ArrayVec<PixelPoint, MAX_OTHERS> = ArrayVec::new();
+        for other in self.others(&at, self.ends_px[PARTS - 1]) {
+            others.try_push(other).ok()?;
+        }
+        let (level, noise) = self.background.at(at.x as f32, at.y as f32);
+        let mut sums = [Sum::default(); PARTS];
+        for y in rows {
+            for x in columns.clone() {
+                let pixel = PixelPoint::new(x as f64, y as f64);
+                let is_within = |end_px: &f64| is_nearer(&pixel, &at, *end_px);
+                if let Some(part) = self.ends_px.iter().position(is_within) {
+                    let is_others = |other| is_nearer(&pixel, other, self.margin_px);
+                    let is_seen = part == 0 || !others.iter().any(is_others);
+                    sums[part].add(f64::from(self.view.at(x, y) - level), is_seen);
+                }
             }
         }
+        Some(sums.map(|sum| sum.over(star.flux_adu, f64::from(noise))))
     }
-    let share = light / source.flux_adu - 1.0;
-    let sigma = f64::from(noise) * f64::from(pixels).sqrt() / source.flux_adu;
-    (share.is_finite() && sigma > 0.0).then_some(StarWings { share, sigma })
+
+    /// Columns and rows of the outermost ring around a place; `None` where they are not all in the frame.
+    fn box_around(&self, at: &PixelPoint) -> Option<[std::ops::RangeInclusive<usize>; 2]> {
+        let radius_px = self.ends_px[PARTS - 1];
+        let span = |center: f64, side: usize| {
+            let (first, last) = ((center - radius_px).ceil(), (center + radius_px).floor());
+            (first >= 0.0 && last < side as f64).then_some(first as usize..=last as usize)
+        };
+        Some([span(at.x, self.view.width)?, span(at.y, self.view.height)?])
+    }
+
+    /// The other sources whose light is within a distance of a place.
+    fn others(&self, at: &PixelPoint, distance_px: f64) -> impl Iterator<Item = PixelPoint> {
+        let places = self.sources.iter().map(|source| source.position);
+        let reach_px = distance_px + self.margin_px;
+        places.filter(move |place| place != at && is_nearer(place, at, reach_px))
+    }
+}
+
+fn is_nearer(a: &PixelPoint, b: &PixelPoint, distance_px: f64) -> bool {
+    let (dx, dy) = (a.x - b.x, a.y - b.y);
+    dx * dx + dy * dy < distance_px * distance_px
+}
+
+/// Pixels of a ring.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    pixels: u32,
+    seen: u32,
+    light: f64,
+}
+
+impl Sum {
+    fn add(&mut self, above: f64, is_seen: bool) {
+        self.pixels += 1;
+        if is_seen {
+            self.seen += 1;
+            self.light += above;
+        }
+    }
+
+    /// The light in all pixels over a flux; not a number where too few are seen.
+    fn over(&self, flux_adu: f64, noise_adu: f64) -> Estimate {
+        let [pixels, seen] = [self.pixels, self.seen].map(f64::from);
+        let is_seen = seen >= MIN_SEEN * pixels;
+        let scale = if is_seen {
+            pixels / seen / flux_adu
+        } else {
+            f64::NAN
+        };
+        Estimate {
+            value: scale * self.light,
+            sigma: scale * noise_adu * seen.sqrt(),
+        }
+    }
 }
 
 /// The weighted mean of `stars` without outliers. Its standard error is that of the pixels' noise,
 /// or, if that is larger, that of the scatter.
-fn mean(stars: &mut [StarWings]) -> Option<Wings> {
+fn mean(mut stars: ArrayVec<Estimate, MAX_STARS>) -> Option<Estimate> {
+    stars.retain(|star| star.value.is_finite() && star.sigma > 0.0);
     if stars.len() < MIN_STARS {
         return None;
     }
-    stars.sort_unstable_by(|a, b| a.share.total_cmp(&b.share));
-    let median = stars[stars.len() / 2].share;
-    let deviation = |star: &StarWings| (star.share - median).abs() / star.sigma;
+    stars.sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
+    let median = stars[stars.len() / 2].value;
+    let deviation = |star: &Estimate| (star.value - median).abs() / star.sigma;
     stars.sort_unstable_by(|a, b| deviation(a).total_cmp(&deviation(b)));
     let scatter = (SIGMA_PER_MAD * deviation(&stars[stars.len() / 2])).max(1.0);
     let (mut weights, mut sum) = (0.0, 0.0);
     for star in stars.iter() {
         if deviation(star) <= CLIP_SIGMAS * scatter {
             weights += star.sigma.powi(-2);
-            sum += star.share * star.sigma.powi(-2);
+            sum += star.value * star.sigma.powi(-2);
         }
     }
-    Some(Wings {
-        share: sum / weights,
+    Some(Estimate {
+        value: sum / weights,
         sigma: scatter / weights.sqrt(),
     })
 }
@@ -138,16 +276,114 @@ fn mean(stars: &mut [StarWings]) -> Option<Wings> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::{DetectConfig, Workspace, detect};
+    use crate::frame::Frame;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    fn estimates<const N: usize>(values: [f64; N], sigma: f64) -> ArrayVec<Estimate, MAX_STARS> {
+        let estimate = |value| Estimate { value, sigma };
+        values.map(estimate).into_iter().collect()
+    }
 
     #[test]
     fn outliers_do_not_move_the_mean_and_scatter_widens_its_error() {
-        let star = |share: f64| StarWings { share, sigma: 0.01 };
-        let alike = [0.049, 0.05, 0.05, 0.051, 0.05, 0.9].map(star);
-        let found = mean(&mut alike.clone()).unwrap();
-        assert!((found.share - 0.05).abs() < 1e-9, "{found:?}");
+        let alike = estimates([0.049, 0.05, 0.05, 0.051, 0.05, 0.9], 0.01);
+        let found = mean(alike.clone()).unwrap();
+        assert!((found.value - 0.05).abs() < 1e-9, "{found:?}");
         assert!((found.sigma - 0.01 / 5f64.sqrt()).abs() < 1e-9);
-        let spread = [0.0, 0.03, 0.05, 0.08, 0.11].map(star);
-        assert!(mean(&mut spread.clone()).unwrap().sigma > 0.015);
-        assert!(mean(&mut alike[..2].to_vec()).is_none());
+        let spread = estimates([0.0, 0.03, 0.05, 0.08, 0.11], 0.01);
+        assert!(mean(spread).unwrap().sigma > 0.015);
+        assert!(mean(alike.into_iter().take(2).collect()).is_none());
+    }
+
+    #[test]
+    fn the_light_beyond_the_rings_is_that_of_their_power_law_or_in_the_error() {
+        let rings = |part_beyond: &dyn Fn(f64) -> f64, sigma: f64| {
+            let value = |ends: &[f64]| part_beyond(ends[0]) - part_beyond(ends[1]);
+            let values = ENDS_SIGMAS.windows(2).map(value);
+            let rings = values.map(|value| Estimate { value, sigma });
+            beyond(&rings.collect::<Vec<_>>()).unwrap()
+        };
+        let diffraction = |end: f64| 0.6 / end;
+        let moffat = |end: f64| (1.0 + (end / 2.0).powi(2)).powf(-1.5);
+        for part_beyond in [&diffraction as &dyn Fn(f64) -> f64, &moffat] {
+            let exact = rings(part_beyond, 1e-4);
+            assert!(
+                (exact.value / part_beyond(ENDS_SIGMAS[0]) - 1.0).abs() < 0.05,
+                "{exact:?}"
+            );
+            let noisy = rings(part_beyond, 0.02);
+            let off = noisy.value - part_beyond(ENDS_SIGMAS[0]);
+            assert!(off.abs() < 2.0 * noisy.sigma, "{noisy:?}");
+        }
+    }
+
+    #[test]
+    fn wings_that_may_be_chance_are_in_the_error_alone() {
+        let of = |value: f64, sigma: f64| FluxScale::of(&Estimate { value, sigma });
+        assert!(of(0.1, 0.01).wings.is_some() && of(-0.04, 0.005).wings.is_some());
+        let ordinary = of(0.003, 0.003);
+        assert!(ordinary.wings.is_none() && ordinary.sigma < 0.0015);
+        let unclear = of(0.1, 0.06);
+        assert!(
+            unclear.wings.is_none() && unclear.sigma > 0.05,
+            "{unclear:?}"
+        );
+    }
+
+    /// Flux found over the true one of 40 stars whose light beyond 1 px has this profile.
+    fn flux_found(density: impl Fn(f64) -> f64, seed: u64) -> (f64, FluxScale) {
+        const SIDE: usize = 400;
+        const FLUX: f64 = 4000.0;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut pixels: Vec<f64> = (0..SIDE * SIDE)
+            .map(|_| 100.0 + 4.0 * random.sample::<f64, _>(StandardNormal))
+            .collect();
+        for number in 0..36 {
+            let [x, y] = [number % 6, number / 6]
+                .map(|at| 40.0 + 64.0 * at as f64 + random.random_range(0.0..1.0));
+            for (index, pixel) in pixels.iter_mut().enumerate() {
+                let (dx, dy) = ((index % SIDE) as f64 - x, (index / SIDE) as f64 - y);
+                let r2 = dx * dx + dy * dy;
+                if r2 < 1600.0 {
+                    *pixel += FLUX * density(r2);
+                }
+            }
+        }
+        let pixels = pixels.into_iter().map(|pixel| pixel as f32).collect();
+        let frame = Frame::new(SIDE, SIDE, pixels).unwrap();
+        let found = detect(&frame, &DetectConfig::default(), &mut Workspace::new()).unwrap();
+        let fluxes = found
+            .sources
+            .iter()
+            .take(36)
+            .map(|source| source.flux_adu / FLUX);
+        let scale = FluxScale {
+            wings: found.wings,
+            sigma: found.flux_scale_sigma,
+        };
+        (fluxes.sum::<f64>() / 36.0, scale)
+    }
+
+    #[test]
+    fn fluxes_are_whole_whatever_the_profile_of_the_stars() {
+        use std::f64::consts::PI;
+        let gauss = |r2: f64| (-r2 / 2.0).exp() / (2.0 * PI);
+        let moffat = |r2: f64| 1.5 / (PI * 3.6) * (1.0 + r2 / 3.6).powf(-2.5);
+        let halo =
+            |r2: f64| 0.85 * gauss(r2) + 0.15 * 0.5 / (PI * 16.0) * (1.0 + r2 / 16.0).powf(-1.5);
+        let (found, scale) = flux_found(gauss, 1);
+        assert!(scale.wings.is_none() && scale.sigma < 0.01, "{scale:?}");
+        assert!((found - 1.0).abs() < 0.01, "{found}");
+        for density in [&moffat as &dyn Fn(f64) -> f64, &halo] {
+            let (found, scale) = flux_found(density, 2);
+            assert!(scale.wings.is_some());
+            assert!(
+                (found - 1.0).abs() < 2.5 * scale.sigma.max(0.004),
+                "{found} {scale:?}"
+            );
+        }
     }
 }

@@ -61,6 +61,37 @@ pub struct Completeness {
     pub bins: Vec<MagnitudeBin>,
     /// The limit, or the reason why there is none.
     pub limit: Result<Limit, NoLimit>,
+    /// Where it falls, as far as the stars tell: also where that is too uncertain for a limit. `None` without stars.
+    pub(super) fall: Option<Fall>,
+}
+
+/// Where the completeness falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fall {
+    /// V magnitude m₅₀.
+    v_mag: f64,
+    /// Width w, in magnitudes.
+    width_mag: f64,
+}
+
+impl Fall {
+    /// Whether at least 98 % of the stars of this magnitude are detected that are not otherwise lost.
+    pub fn is_complete_at(&self, v_mag: f64) -> bool {
+        const COMPLETE_WIDTHS: f64 = 2.0;
+        v_mag < self.v_mag - COMPLETE_WIDTHS * self.width_mag
+    }
+
+    /// By how much noise of this standard deviation makes the detected ones of the stars of a magnitude brighter,
+    /// on average, in magnitudes: the others are not detected.
+    pub fn brightening_mag(&self, v_mag: f64, sigma_mag: f64) -> f64 {
+        /// Fainter ones, in widths beyond m₅₀, owe their names to chance.
+        const FAINTEST_WIDTHS: f64 = 3.0;
+        // Noise is a part of the width.
+        let width_mag = self.width_mag.max(sigma_mag);
+        let brighter = (self.v_mag - v_mag) / width_mag;
+        let (detected, density) = normal_cdf_and_density(brighter.max(-FAINTEST_WIDTHS));
+        sigma_mag * sigma_mag / width_mag * density / detected
+    }
 }
 
 /// One bin of the curve.
@@ -125,9 +156,11 @@ pub fn measure(stars: &[CountedStar], chance: f64) -> Completeness {
         let order = a.v_mag.total_cmp(&b.v_mag);
         order.then(b.detected.cmp(&a.detected))
     });
+    let fit = Curve::fit(&stars, chance);
     Completeness {
         bins: bins(&stars),
-        limit: limit(&stars, chance),
+        limit: limit(&stars, fit.as_ref()),
+        fall: fit.map(|fit| fit.curve.fall()),
     }
 }
 
@@ -151,7 +184,7 @@ fn bins(stars: &[CountedStar]) -> Vec<MagnitudeBin> {
     (0..=(last - first) as usize).map(bin).collect()
 }
 
-fn limit(stars: &[CountedStar], chance: f64) -> Result<Limit, NoLimit> {
+fn limit(stars: &[CountedStar], fit: Option<&CurveFit>) -> Result<Limit, NoLimit> {
     let detected = stars.iter().filter(|star| star.detected).count();
     if detected < MIN_PER_SIDE {
         return Err(NoLimit::TooFewDetected);
@@ -159,9 +192,10 @@ fn limit(stars: &[CountedStar], chance: f64) -> Result<Limit, NoLimit> {
     if stars.len() - detected < MIN_PER_SIDE {
         return Err(NoLimit::CatalogEnds);
     }
-    let fit = Curve::fit(stars, chance).ok_or(NoLimit::Uncertain)?;
+    let fit = fit.ok_or(NoLimit::Uncertain)?;
     let sigma_mag = fit.sigma_mag.ok_or(NoLimit::Uncertain)?;
-    let brighter = stars.partition_point(|star| star.v_mag < fit.curve.v_mag);
+    let fall = fit.curve.fall();
+    let brighter = stars.partition_point(|star| star.v_mag < fall.v_mag);
     let detected = stars[..brighter].iter().filter(|t| t.detected).count();
     let missed = stars[brighter..].iter().filter(|t| !t.detected).count();
     if missed < MIN_PER_SIDE {
@@ -174,9 +208,9 @@ fn limit(stars: &[CountedStar], chance: f64) -> Result<Limit, NoLimit> {
         return Err(NoLimit::Uncertain);
     }
     Ok(Limit {
-        v_mag: fit.curve.v_mag,
+        v_mag: fall.v_mag,
         sigma_mag,
-        width_mag: libm::exp(fit.curve.ln_width),
+        width_mag: fall.width_mag,
         lost: fit.curve.lost(),
     })
 }
@@ -252,6 +286,13 @@ impl Curve {
             ln_width: (self.ln_width + step[1]).clamp(-5.0, 3.0),
             logit_lost: (self.logit_lost + step[2]).clamp(-20.0, 20.0),
             chance: self.chance,
+        }
+    }
+
+    fn fall(&self) -> Fall {
+        Fall {
+            v_mag: self.v_mag,
+            width_mag: libm::exp(self.ln_width),
         }
     }
 

@@ -4,7 +4,7 @@
 //!
 //! 1. The catalogue's stars in the frame are predicted, at its date and to well below the faintest
 //!    detection. Those that a detection has the name of are detected.
-//! 2. Bright, single, constant, unsaturated stars give the zero point ([`zero_point`]).
+//! 2. Bright, single, constant, unsaturated stars (`standards`) give the zero point ([`zero_point`]).
 //! 3. All single stars, detected or not, give the completeness ([`completeness`]) and the limiting
 //!    magnitude, at which half of the stars are detected, on a background with its mean of faint
 //!    stars. The faintest detected star is a poor measure of the limit, because it owes its detection
@@ -23,6 +23,7 @@ pub mod comparison;
 pub mod completeness;
 mod identified_frame;
 pub mod sky_map;
+mod standards;
 pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};
@@ -37,7 +38,8 @@ use crate::identify::{IndexedCatalog, SkyView};
 use crate::sky::catalog::StarIndex;
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
-use zero_point::{StandardStar, ZeroPoint};
+use standards::Standards;
+use zero_point::{NoZeroPoint, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
 #[doc(hidden)]
@@ -53,6 +55,8 @@ pub struct FramePhotometry {
     /// V magnitude of a star that gives 1 ADU, or 1 ADU/s where the exposure is known; `None` with
     /// too few stars.
     pub zero_point: Option<ZeroPoint>,
+    /// Why there is none; `None` where there is one.
+    pub no_zero_point: Option<NoZeroPoint>,
     /// The exposure by which fluxes were divided, in seconds.
     pub exposure_s: Option<f64>,
     /// The share of stars that is detected, by magnitude.
@@ -78,20 +82,11 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         completeness::measure(&counted.collect::<Vec<_>>(), chance)
     };
     let by_v = counted(&|star| star.v_mag);
-    // Where the field of an all-sky lens ends, in units of the distance of the corners.
-    let camera = &frame.identification.camera;
-    let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
-    let standards: Vec<StandardStar> = clear
-        .iter()
-        .filter_map(|star| standard_star(star, &by_v, frame, sky))
-        .map(|star| StandardStar {
-            off_centre_sq: star.off_centre_sq / edge_sq,
-            ..star
-        })
-        .collect();
-    let mut zero_point = zero_point::measure(&standards);
-    if let (Some(zero_point), Some(wings)) = (&mut zero_point, frame.detections.wings) {
-        let common_sigma_mag = MAG_PER_RELATIVE * wings.sigma / (1.0 + wings.share);
+    let standards = Standards::of(&clear, frame, sky);
+    let chosen = standards.chosen(by_v.fall.as_ref());
+    let mut zero_point = zero_point::measure(&chosen);
+    if let Some(zero_point) = &mut zero_point {
+        let common_sigma_mag = MAG_PER_RELATIVE * frame.detections.flux_scale_sigma;
         zero_point.sigma_mag = libm::hypot(zero_point.sigma_mag, common_sigma_mag);
     }
     let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
@@ -107,52 +102,11 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         completeness.limit = Err(NoLimit::StarsLeftOut);
     }
     FramePhotometry {
+        no_zero_point: zero_point.is_none().then(|| standards.lack()),
         zero_point,
         exposure_s: frame.exposure_s,
         completeness,
     }
-}
-
-/// `star` with its measured magnitude, if it is fit for the zero point.
-fn standard_star(
-    star: &FrameStar,
-    completeness: &Completeness,
-    frame: &IdentifiedFrame,
-    sky: &IndexedCatalog,
-) -> Option<StandardStar> {
-    /// Stars of the zero point are brighter than the limit by this many widths, where at least 98 %
-    /// are detected. A choice by flux would prefer stars that noise or color makes brighter.
-    const COMPLETE_WIDTHS: f64 = 2.0;
-    /// Smallest signal-to-noise ratio where there is no limit.
-    const MIN_SNR: f64 = 10.0;
-    /// Largest light of undetected neighbors that is subtracted, or added, over the star's own.
-    const MAX_NEIGHBORS_LIGHT: f64 = 0.1;
-    let detection = &frame.detections.sources[star.detection?];
-    let is_bright = match &completeness.limit {
-        Ok(limit) => star.v_mag < limit.v_mag - COMPLETE_WIDTHS * limit.width_mag,
-        Err(_) => detection.snr >= MIN_SNR,
-    };
-    let known = sky.catalog().star(star.star);
-    let is_alone = star.neighbors_light.abs() < MAX_NEIGHBORS_LIGHT;
-    let is_fit = is_bright
-        && is_alone
-        && detection.flags.has_clean_flux()
-        && known.flags.is_constant_and_single();
-    let off_centre_sq = frame
-        .identification
-        .camera
-        .off_centre_sq(&detection.position);
-    let Measured {
-        instrumental_mag,
-        sigma_mag,
-    } = Measured::of(frame, star, detection);
-    is_fit.then(|| StandardStar {
-        v_mag: star.v_mag,
-        bv_mag: known.bv_mag.map(f64::from),
-        instrumental_mag,
-        sigma_mag,
-        off_centre_sq,
-    })
 }
 
 /// A star's brightness in a frame.

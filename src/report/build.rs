@@ -337,6 +337,10 @@ fn photometry(measured: &FramePhotometry) -> PhotometryReport {
     PhotometryReport {
         zero_point_vmag: zero_point.and_then(|zero| mag(zero.v_mag)),
         zero_point_sigma_mag: zero_point.and_then(|zero| mag(zero.sigma_mag)),
+        no_zero_point: measured.no_zero_point.map(|reason| NoteReport {
+            code: reason.code(),
+            text: reason.to_string(),
+        }),
         flux_unit: measured.exposure_s.map_or("ADU", |_| "ADU/s"),
         scatter_mag: zero_point.and_then(|zero| mag(zero.scatter_mag)),
         zero_point_stars: zero_point.map_or(0, |zero| zero.stars),

@@ -79,12 +79,12 @@ pub struct FrameReport {
     pub timing_ms: TimingReport,
 }
 
-/// One note.
+/// One note, or another statement with a code.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NoteReport {
-    /// Code of the note, see [`Note::code`](crate::pipeline::Note::code).
+    /// Code for programs: of a note that of [`Note::code`](crate::pipeline::Note::code).
     pub code: &'static str,
-    /// The note as a sentence.
+    /// The sentence.
     pub text: String,
 }
 
@@ -328,6 +328,8 @@ pub struct PhotometryReport {
     pub zero_point_vmag: Option<f64>,
     /// Its standard error.
     pub zero_point_sigma_mag: Option<f64>,
+    /// Why there is none, with the code of [`NoZeroPoint`](crate::photometry::zero_point::NoZeroPoint).
+    pub no_zero_point: Option<NoteReport>,
     /// `ADU/s` where the exposure is known, else `ADU`.
     pub flux_unit: &'static str,
     /// Robust standard deviation of a star about zero point and color term.

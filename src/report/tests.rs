@@ -115,6 +115,7 @@ fn photometry() -> PhotometryReport {
     PhotometryReport {
         zero_point_vmag: Some(16.5253),
         zero_point_sigma_mag: Some(0.0303),
+        no_zero_point: None,
         flux_unit: "ADU/s",
         scatter_mag: Some(0.1542),
         zero_point_stars: 38,

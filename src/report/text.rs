@@ -305,7 +305,10 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
             counted(photometry.zero_point_stars, "star"),
             photometry.scatter_mag.unwrap_or(f64::NAN),
         ),
-        None => "too few stars to tell".to_owned(),
+        None => photometry
+            .no_zero_point
+            .as_ref()
+            .map_or_else(String::new, |reason| reason.text.clone()),
     };
     if let Some((term, sigma)) = photometry.color_term.zip(photometry.color_term_sigma) {
         text += &format!("; {term:+.2} ± {sigma:.2} (B−V − 0.6)");

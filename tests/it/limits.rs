@@ -14,6 +14,18 @@ fn process(arguments: &[&Path]) -> Ran {
     Ran::new(starpipe().arg("process").args(arguments))
 }
 
+#[test]
+fn the_documents_state_the_time_limit_of_the_program() {
+    let limit_s = starpipe::pipeline::DEFAULT_TIME_LIMIT_S;
+    for (name, stated) in [
+        ("SECURITY.md", format!("`--time-limit` ({limit_s} s,")),
+        ("docs/process.md", format!("in seconds (default {limit_s})")),
+    ] {
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
+        assert!(text.contains(&stated), "{name}: {stated}");
+    }
+}
+
 /// Asserts that the file is refused with a message that contains `expected`.
 fn assert_refused(name: &str, content: &[u8], expected: &str) {
     let directory = tempfile::tempdir().unwrap();

@@ -38,7 +38,7 @@ pub fn excerpt(text: &str) -> Cow<'_, str> {
 
 /// Whether a character is not drawn itself, but changes how others are: marks, embeddings, overrides
 /// and isolates of the bidirectional algorithm (Unicode Standard Annex 9), and separators of lines and
-/// paragraphs.
+/// paragraphs. Those that are no characters, which XML does not allow, are among them.
 pub const fn is_deceptive(character: char) -> bool {
     matches!(
         character,
@@ -48,6 +48,8 @@ pub const fn is_deceptive(character: char) -> bool {
             | '\u{2028}'..='\u{202e}'
             | '\u{2066}'..='\u{2069}'
             | '\u{feff}'
+            | '\u{fffe}'
+            | '\u{ffff}'
     )
 }
 
@@ -71,9 +73,10 @@ pub fn json_escaped(json: String) -> String {
     escaped
 }
 
-/// Text between the tags of XML.
+/// Text between the tags of XML, with the characters escaped as [`printable`] does: XML allows few of them.
 pub(crate) fn xml_escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    printable(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
@@ -136,6 +139,17 @@ mod tests {
         let long = "ä".repeat(200_000);
         let expected = format!("{}… (200000 characters)", "ä".repeat(80));
         assert_eq!(excerpt(&long), expected);
+    }
+
+    #[test]
+    fn text_of_xml_has_only_what_xml_allows() {
+        for (text, shown) in [
+            ("a<b>&\"'", "a&lt;b&gt;&amp;\"'"),
+            ("\n\t\u{1b}[31m\u{85}", "\\n\\t\\u{1b}[31m\\u{85}"),
+            ("\u{0}\u{202e}\u{ffff}é星", "\\u{0}\\u{202e}\\u{ffff}é星"),
+        ] {
+            assert_eq!(xml_escaped(text), shown);
+        }
     }
 
     #[test]

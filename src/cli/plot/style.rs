@@ -4,6 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters_backend::BackendCoord;
+use starpipe::base::format::printable;
 use std::fmt::Display;
 
 /// The family of all letters.
@@ -53,7 +54,8 @@ pub(super) fn draw_text<B: DrawingBackend>(
         .into_text_style(area)
         .color(&BLACK)
         .pos(Pos::new(HPos::Left, VPos::Center));
-    area.draw_text(text, &style, place).map_err(plot_error)
+    let text = printable(text);
+    area.draw_text(&text, &style, place).map_err(plot_error)
 }
 
 /// A number as figures label it.

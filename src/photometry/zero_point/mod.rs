@@ -27,9 +27,9 @@ mod standard;
 mod weights;
 
 pub(super) use color_index::ColorIndex;
-pub use standard::ZeroPoint;
 #[doc(hidden)]
 pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor};
+pub use standard::{NoZeroPoint, ZeroPoint};
 
 use relation::{Relation, Term};
 

@@ -52,6 +52,40 @@ pub struct ZeroPoint {
     pub is_nonlinear: bool,
 }
 
+/// Why there is no zero point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoZeroPoint {
+    /// Too few stars.
+    #[error(
+        "too few stars: {detected} of the catalogue's stars that stand alone in the frame were detected, and a zero point takes {MIN_STARS}"
+    )]
+    FewDetected {
+        /// Stars that stand alone and were detected.
+        detected: usize,
+    },
+    /// Too few stars whose light is known and whole.
+    #[error(
+        "too few stars: of {detected} that stand alone and were detected, {fit} are constant and single with unsaturated, unblended light, and a zero point takes {MIN_STARS}"
+    )]
+    FewFit {
+        /// Stars that stand alone and were detected.
+        detected: usize,
+        /// Those of them that are fit for a zero point.
+        fit: usize,
+    },
+}
+
+impl NoZeroPoint {
+    /// Code for programs.
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::FewDetected { .. } => "few_stars_detected",
+            Self::FewFit { .. } => "few_stars_fit",
+        }
+    }
+}
+
 /// The color of a star of the zero point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedColor {

@@ -4,7 +4,7 @@
 //! completeness with the predicted limit.
 
 use super::data::PageData;
-use super::template::{Kind, picture_address, render, render_view};
+use super::template::{Kind, picture_address, render, render_view, shown_data};
 use crate::frame::Frame;
 use crate::pipeline::Solution;
 use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
@@ -65,7 +65,7 @@ pub fn view(
     let values = values(report, shown.title, Some(picture), &data);
     Ok(FrameView {
         html: render_view(&FRAME, values)?,
-        data: serde_json::to_string(&data)?,
+        data: shown_data(&data)?,
     })
 }
 
@@ -105,6 +105,7 @@ fn values(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::format::is_deceptive;
     use crate::identify::SearchFailure;
     use crate::pipeline::{Outcome, Reason};
     use crate::report::page::is_page;
@@ -133,6 +134,22 @@ mod tests {
         assert!(page.contains("&lt;script&gt;alert(1)&lt;&#x2f;script&gt;.tif"));
         assert_eq!(page.matches("</script>").count(), 2);
         assert!(is_page(page.as_bytes()));
+    }
+
+    #[test]
+    fn names_show_what_would_change_how_they_are_drawn() {
+        let (solution, mut report) = frame();
+        let name = "a\n\t\u{1b}[31m\u{202e}\u{85}\u{2066}\"'.tif";
+        report.frame = name.to_owned();
+        report.stars[0].name = Some(name.to_owned());
+        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        let is_raw = |c: char| c != '\n' && (c.is_control() || is_deceptive(c));
+        assert!(!page.contains(is_raw) && !page.contains("<title>a\n"));
+        assert!(
+            page.contains("<title>a\\n\\t\\u{1b}[31m\\u{202e}\\u{85}\\u{2066}&quot;&#x27;.tif")
+        );
+        let data = "a\\\\n\\\\t\\\\u{1b}[31m\\\\u{202e}\\\\u{85}\\\\u{2066}\\\"'.tif";
+        assert!(page.contains(data));
     }
 
     #[test]

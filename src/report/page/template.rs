@@ -1,11 +1,12 @@
 //! The templates, and what all pages are made with.
 
+use crate::base::format::{is_deceptive, printable};
 use crate::report::overlay::jpeg;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use image::RgbImage;
 use minijinja::value::Value;
-use minijinja::{Environment, context};
+use minijinja::{Environment, Error, Output, State, context, escape_formatter};
 use serde::Serialize;
 use std::io;
 
@@ -53,6 +54,7 @@ pub(super) fn render_view(kind: &Kind, values: Value) -> io::Result<String> {
 
 fn fill(kind: &Kind, values: Value) -> io::Result<String> {
     let mut environment = Environment::new();
+    environment.set_formatter(format_text);
     for (name, source) in TEMPLATES {
         environment
             .add_template(name, source)
@@ -64,9 +66,42 @@ fn fill(kind: &Kind, values: Value) -> io::Result<String> {
         .map_err(io::Error::other)
 }
 
+/// Writes a value: texts as people may see them, escaped for HTML unless they are markup.
+fn format_text(out: &mut Output, state: &mut State, value: &Value) -> Result<(), Error> {
+    match value.as_str().filter(|_| !value.is_safe()) {
+        Some(text) => escape_formatter(out, state, &Value::from(printable(text))),
+        None => escape_formatter(out, state, value),
+    }
+}
+
 /// JSON that may stand in a script: a name cannot end it.
 fn script_data(data: &impl Serialize) -> io::Result<String> {
-    Ok(serde_json::to_string(data)?.replace('<', "\\u003c"))
+    Ok(shown_data(data)?.replace('<', "\\u003c"))
+}
+
+/// Data as JSON, whose texts are as people may see them.
+pub(super) fn shown_data(data: &impl Serialize) -> io::Result<String> {
+    let json = serde_json::to_string(data)?;
+    let is_shown = |character: char| !character.is_control() && !is_deceptive(character);
+    // In JSON the control characters of ASCII stand behind a backslash.
+    if !json.contains('\\') && json.chars().all(is_shown) {
+        return Ok(json);
+    }
+    Ok(printable_texts(serde_json::to_value(data)?).to_string())
+}
+
+/// `data` with its texts as people may see them.
+fn printable_texts(data: serde_json::Value) -> serde_json::Value {
+    use serde_json::Value;
+    match data {
+        Value::String(text) => Value::String(printable(&text)),
+        Value::Array(items) => items.into_iter().map(printable_texts).collect(),
+        Value::Object(fields) => fields
+            .into_iter()
+            .map(|(name, value)| (name, printable_texts(value)))
+            .collect(),
+        other => other,
+    }
 }
 
 /// A picture as the address that holds it.
