@@ -145,3 +145,19 @@ fn trails_of_satellites_make_no_trails_of_the_stars() {
     let found = detected(&mut rng, points);
     assert_eq!(found.trails, None);
 }
+
+#[test]
+fn pieces_of_satellites_trails_in_similar_directions_are_no_stars() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let stars = stars(&mut rng, 60);
+    let mut points = stars.clone();
+    for (row, slope) in [(60.0, 0.3), (170.0, 0.2), (330.0, 0.1)] {
+        let pieces: Vec<[f64; 3]> = (0..6)
+            .map(|piece| 30.0 + 80.0 * f64::from(piece))
+            .map(|x| [x, row + slope * (x - 230.0), 40_000.0])
+            .collect();
+        points.extend(drawn_out(&pieces, [50.0, 50.0 * slope], |_| 1.0));
+    }
+    let found = detected(&mut rng, points.into_iter());
+    assert_eq!(found.trails, None);
+}

@@ -53,9 +53,9 @@ impl Trails {
         let aligned: ArrayVec<&LargeRegion<'_>, MAX> =
             long.iter().filter(is_aligned).copied().collect();
         // Twice the direction's angle is that of the ellipticity.
-        let half_angle = 0.5 * libm::atan2(doubled[1], doubled[0]);
-        let direction = [libm::cos(half_angle), libm::sin(half_angle)];
-        if aligned.len() < fewest || lines(&aligned, direction) < MIN.max(aligned.len() / 2) {
+        let direction = axis_of(doubled);
+        let lines = lines(&aligned, direction).min(rows(&aligned));
+        if aligned.len() < fewest || lines < MIN.max(aligned.len() / 2) {
             return None;
         }
         let lengths = aligned.iter().map(|large| length_px(large.region));
@@ -174,7 +174,49 @@ fn middle_of(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// Number of lines on which the regions are.
+/// Number of rows of regions, each of which goes on where the one before it ends: the pieces of one trail.
+/// Trails of satellites may have several directions.
+fn rows(regions: &[&LargeRegion<'_>]) -> usize {
+    let mut row: ArrayVec<usize, MAX> = (0..regions.len()).collect();
+    for (i, first) in regions.iter().enumerate() {
+        for (j, second) in regions.iter().enumerate().skip(i + 1) {
+            if row[i] != row[j] && goes_on(first.region, second.region) {
+                let [kept, joined] = [row[i], row[j]];
+                row.iter_mut()
+                    .filter(|row| **row == joined)
+                    .for_each(|row| *row = kept);
+            }
+        }
+    }
+    row.sort_unstable();
+    row.windows(2).filter(|pair| pair[0] != pair[1]).count() + 1
+}
+
+/// Whether each of two regions lies on the line of the other, and not far from it.
+fn goes_on(first: &Region, second: &Region) -> bool {
+    /// Largest distance of the middles, in lengths.
+    const FAR: f64 = 4.0;
+    /// Error of a region's direction, in radians.
+    const SLOPE: f64 = 0.03;
+    let [dx, dy] = [second.x - first.x, second.y - first.y];
+    let distance_px = libm::hypot(dx, dy);
+    let apart_px = 3.0 * first.minor_px.max(second.minor_px) + SLOPE * distance_px;
+    let is_on_line = |region: &Region| {
+        let [cos, sin] = axis_of(doubled_direction(region));
+        (dy * cos - dx * sin).abs() < apart_px
+    };
+    distance_px < FAR * length_px(first).max(length_px(second))
+        && is_on_line(first)
+        && is_on_line(second)
+}
+
+/// The direction of half the angle.
+fn axis_of(doubled: [f64; 2]) -> [f64; 2] {
+    let half_angle = 0.5 * libm::atan2(doubled[1], doubled[0]);
+    [libm::cos(half_angle), libm::sin(half_angle)]
+}
+
+/// Number of lines in one direction on which the regions are.
 fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
     let across = regions
         .iter()
