@@ -139,9 +139,12 @@ pub enum NoLimit {
     /// Too few stars are bright enough.
     #[error("too few of the catalogue's stars are bright enough for the frame")]
     TooFewDetected,
-    /// Only the brightest stars were wanted, and there are fainter ones.
-    #[error("only the brightest stars were wanted: the frame shows fainter ones")]
-    StarsLeftOut,
+    /// There are more detections than may be measured.
+    #[error("only the brightest {measured} detections were measured: the frame shows fainter ones")]
+    StarsLeftOut {
+        /// How many were measured.
+        measured: usize,
+    },
     /// The fall is not clear.
     #[error("too few stars to tell where completeness falls")]
     Uncertain,

@@ -14,7 +14,7 @@ pub struct IdentifiedFrame<'a> {
     pub detections: &'a Detections,
     /// Camera, attitude and matches; the matches are indices into the detections.
     pub identification: &'a Identification,
-    /// Date of the frame, in Julian years since J2000.0.
+    /// Where the catalogue's stars appear.
     pub places: StarPlaces,
     /// Exposure in seconds, where known.
     pub exposure_s: Option<f64>,

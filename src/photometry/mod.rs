@@ -99,7 +99,8 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         }),
     };
     if frame.detections.is_truncated {
-        completeness.limit = Err(NoLimit::StarsLeftOut);
+        let measured = frame.detections.sources.len();
+        completeness.limit = Err(NoLimit::StarsLeftOut { measured });
     }
     FramePhotometry {
         no_zero_point: zero_point.is_none().then(|| standards.lack()),

@@ -139,7 +139,7 @@ fn only_as_many_stars_are_measured_as_are_wanted() {
     assert!(all["photometry"]["limit50_vmag"].is_number());
     assert!(bright["photometry"]["limit50_vmag"].is_null());
     let reason = bright["photometry"]["limit50_reason"].as_str().unwrap();
-    assert!(reason.contains("brightest"), "{reason}");
+    assert!(reason.contains("brightest 30 detections"), "{reason}");
     assert!(bright["photometry"]["zero_point_vmag"].is_number());
 }
 
