@@ -137,6 +137,37 @@ fn a_quiet_run_prints_errors_only() {
 }
 
 #[test]
+fn a_quiet_run_prints_the_report_that_is_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let missing = directory.path().join("missing.tif");
+    let process = |arguments: &[&str]| {
+        let mut command = starpipe();
+        command.arg("process").args(arguments);
+        Ran::new(command.args([&orion(), &missing]))
+    };
+    for format in ["json", "csv", "text", "frames-csv"] {
+        let [quiet, usual] = [&["-q", "--format", format][..], &["--format", format]].map(process);
+        assert_eq!(quiet.status, 1, "{}", quiet.stderr);
+        assert_eq!(quiet.stdout.lines().count(), usual.stdout.lines().count());
+        assert_eq!(quiet.stderr.lines().count(), 1, "{}", quiet.stderr);
+    }
+    // A cache that cannot be written is a warning.
+    let run = |arguments: &[&str]| {
+        let mut command = starpipe();
+        command.arg("process").args(arguments);
+        Ran::new(
+            command
+                .arg("--cache-dir")
+                .args([orion().join("below"), orion()]),
+        )
+    };
+    let [quiet, usual] = [&["-q", "--format", "json"][..], &["--format", "json"]].map(run);
+    assert!(usual.stderr.contains("warning"), "{}", usual.stderr);
+    assert_eq!((quiet.status, quiet.stderr.as_str()), (0, ""));
+    assert_eq!(quiet.reports().len(), 1);
+}
+
+#[test]
 fn a_frame_that_is_not_identified_has_no_header_left_from_before() {
     let directory = tempfile::tempdir().unwrap();
     let frame = directory.path().join("frame.png");

@@ -35,11 +35,11 @@ pub(crate) struct NightArgs {
     /// Also write night.html: the figure, what changed, and the table, to look at in a browser
     #[arg(long)]
     pub(super) html: bool,
-    /// What to print when the night is done
-    #[arg(long, value_enum, default_value_t = PageFormat::Text)]
-    pub(super) format: PageFormat,
-    /// Print errors only
-    #[arg(short, long, conflicts_with = "format")]
+    /// What to print when the night is done [default: text]
+    #[arg(long, value_enum)]
+    pub(super) format: Option<PageFormat>,
+    /// Print errors only: no progress, no warnings, and no report but one that --format asks for
+    #[arg(short, long)]
     pub(super) quiet: bool,
     /// Leave out the hot pixels that the sky's motion tells, which hot-pixels.csv lists
     #[arg(long, conflicts_with = "hot_pixels")]

@@ -36,7 +36,8 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
     let plan = arguments.plan()?;
     let (names, mut passed_over) = frame_names(&arguments.frames, Cameras::OneNight)?;
     passed_over.retain(|file| !is_own_result(&arguments.out, &file.path));
-    arguments.catalog.with_index(|pool, indexed| {
+    let (catalog, tells) = (&arguments.catalog, !arguments.quiet);
+    catalog.with_index_told(tells, |pool, indexed| {
         let names = order::by_date(names, pool, plan.memory);
         let owner = claim(arguments, &plan, &names, indexed.catalog())?;
         let (journal, kept) =
@@ -185,9 +186,9 @@ fn finish(
         Exit::Success
     };
     let text = match arguments.format {
-        _ if arguments.quiet => String::new(),
-        PageFormat::Text => text::text(&night),
-        PageFormat::Json => json_line(&night)?,
+        None if arguments.quiet => String::new(),
+        None | Some(PageFormat::Text) => text::text(&night),
+        Some(PageFormat::Json) => json_line(&night)?,
     };
     Ok(Outcome { text, exit }.if_written(all_written))
 }

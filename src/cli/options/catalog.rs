@@ -5,6 +5,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::messages::{one_line, report_warning};
 use crate::cli::progress::bar;
 use clap::Args;
+use indicatif::ProgressBar;
 use starpipe::identify::{IndexedCatalog, cache_directory};
 use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
@@ -33,22 +34,35 @@ impl CatalogOptions {
         &self,
         work: impl FnOnce(&rayon::ThreadPool, &IndexedCatalog) -> Result<R, CommandError>,
     ) -> Result<R, CommandError> {
+        self.with_index_told(true, work)
+    }
+
+    /// The same; with `tells`, progress and warnings are shown.
+    pub(crate) fn with_index_told<R>(
+        &self,
+        tells: bool,
+        work: impl FnOnce(&rayon::ThreadPool, &IndexedCatalog) -> Result<R, CommandError>,
+    ) -> Result<R, CommandError> {
         let pool = self.threads.pool()?;
-        let catalog = pool.install(|| self.read())?;
-        let indexed = pool.install(|| self.index(&catalog));
-        report_cache_errors(&indexed);
+        let catalog = pool.install(|| self.read_told(tells))?;
+        let indexed = pool.install(|| self.index(&catalog, tells));
+        report_cache_errors(&indexed, tells);
         let result = work(&pool, &indexed);
-        report_cache_errors(&indexed);
+        report_cache_errors(&indexed, tells);
         result
     }
 
     /// Reads the catalogue, or takes the built-in one.
     pub(crate) fn read(&self) -> anyhow::Result<Cow<'static, Catalog>> {
+        self.read_told(true)
+    }
+
+    fn read_told(&self, tells: bool) -> anyhow::Result<Cow<'static, Catalog>> {
         let Some(path) = &self.catalog else {
             return Ok(Cow::Borrowed(Catalog::built_in()));
         };
         let reading = catalog::read(path)?;
-        for file in &reading.files {
+        for file in reading.files.iter().filter(|_| tells) {
             if let Some(reasons) = file.summary.left_out() {
                 let (path, records) = (file.path.display(), file.summary.records);
                 report_warning(format_args!(
@@ -60,8 +74,11 @@ impl CatalogOptions {
     }
 
     /// The catalogue with its index, from the cache if possible.
-    fn index<'a>(&self, catalog: &'a Catalog) -> IndexedCatalog<'a> {
-        let progress = bar(100, "indexing the catalogue {wide_bar} {percent} %");
+    fn index<'a>(&self, catalog: &'a Catalog, tells: bool) -> IndexedCatalog<'a> {
+        let progress = match tells {
+            true => bar(100, "indexing the catalogue {wide_bar} {percent} %"),
+            false => ProgressBar::hidden(),
+        };
         let show = |part: f64| progress.set_position((part * 100.0) as u64);
         let directory = self.cache_dir.clone().or_else(cache_directory);
         let indexed = IndexedCatalog::open(catalog, directory.as_deref(), &show);
@@ -70,9 +87,9 @@ impl CatalogOptions {
     }
 }
 
-/// Reports the errors of the cache since the last report.
-fn report_cache_errors(indexed: &IndexedCatalog) {
-    for error in indexed.take_cache_errors() {
+/// Reports the errors of the cache since the last report, where warnings are shown.
+fn report_cache_errors(indexed: &IndexedCatalog, tells: bool) {
+    for error in indexed.take_cache_errors().into_iter().filter(|_| tells) {
         let error = one_line(&error);
         report_warning(format_args!(
             "{error}; results are unaffected, but take longer"

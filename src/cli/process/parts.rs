@@ -5,6 +5,7 @@ use crate::cli::exit::{CommandError, Outcome, Tally};
 use crate::cli::input::names::frame_names;
 use crate::cli::output::messages::{one_line, report_error, report_mended, report_warning};
 use crate::cli::progress::frames_bar;
+use crate::cli::solving::options::SolvingOptions;
 use crate::cli::solving::{Inputs, Sink, Solved, Solver};
 use indicatif::ProgressBar;
 use starpipe::archive::{
@@ -27,7 +28,10 @@ pub(super) fn process_parts(
     let (names, _) = frame_names(&arguments.frames.frames, Cameras::Any)?;
     let plan = Plan::new(names, options.frames_per_part)?;
     let inputs = Inputs::Frames(arguments.page.unwrap_or_default());
-    arguments.solving.catalog.with_index(|pool, indexed| {
+    let SolvingOptions {
+        catalog, output, ..
+    } = &arguments.solving;
+    catalog.with_index_told(!output.quiet, |pool, indexed| {
         let ProcessArgs {
             calibration, page, ..
         } = arguments;
@@ -47,8 +51,12 @@ pub(super) fn process_parts(
         });
         let shard = options.shard.unwrap_or(Shard::ALL);
         let parts: Vec<Part> = archive.plan().shard(shard).collect();
-        let counts = worker.run(&archive, &parts)?;
-        Ok(counts.outcome())
+        let counts = worker.run(&archive, &parts, output.quiet)?;
+        let mut outcome = counts.outcome();
+        if output.quiet {
+            outcome.text.clear();
+        }
+        Ok(outcome)
     })
 }
 
@@ -89,9 +97,17 @@ struct Counts {
 }
 
 impl Worker<'_> {
-    fn run(&self, archive: &Archive, parts: &[Part]) -> Result<Counts, CommandError> {
+    fn run(
+        &self,
+        archive: &Archive,
+        parts: &[Part],
+        is_quiet: bool,
+    ) -> Result<Counts, CommandError> {
         let frames: usize = parts.iter().map(|part| part.names.len()).sum();
-        let progress = frames_bar(frames as u64);
+        let progress = match is_quiet {
+            true => ProgressBar::hidden(),
+            false => frames_bar(frames as u64),
+        };
         let mut counts = Counts::default();
         for part in parts {
             match archive.state(part) {

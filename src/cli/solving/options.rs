@@ -31,7 +31,7 @@ pub(crate) struct SolvingOptions {
           default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
     pub(crate) time_limit_s: f64,
     #[command(flatten)]
-    pub(super) output: OutputOptions,
+    pub(crate) output: OutputOptions,
     #[command(flatten)]
     pub(crate) catalog: CatalogOptions,
 }
@@ -73,16 +73,16 @@ pub(super) enum ReportFormat {
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
-pub(super) struct OutputOptions {
+pub(crate) struct OutputOptions {
     /// What to print [default: text; table for several inputs on a terminal]
     #[arg(long, value_enum)]
     pub(super) format: Option<ReportFormat>,
     /// With --format text, list every identified star and not just the brightest
     #[arg(short = 'v', long, visible_alias = "verbose")]
     pub(super) all_stars: bool,
-    /// Print errors only: no reports, no progress, no summary
-    #[arg(short, long, conflicts_with_all = ["format", "all_stars"])]
-    pub(super) quiet: bool,
+    /// Print errors only: no progress, no warnings, and no reports but those that --format asks for
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
     /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header,
     /// if the frame is identified) and, for frames, FRAME.png (a picture with the stars marked and named)
     #[arg(short, long, value_name = "DIR")]

@@ -13,7 +13,8 @@ use std::ops::ControlFlow;
 
 /// Prints reports as they come.
 pub(super) struct Printer {
-    is_quiet: bool,
+    /// Nothing is printed.
+    is_silent: bool,
     format: ReportFormat,
     text: TextOptions,
     reports: usize,
@@ -33,7 +34,7 @@ impl Printer {
             ReportFormat::Text
         };
         Self {
-            is_quiet: options.quiet,
+            is_silent: options.quiet && options.format.is_none(),
             format: options.format.unwrap_or(usual),
             text,
             reports: 0,
@@ -52,7 +53,7 @@ impl Printer {
         report: &FrameReport,
         row: Option<&FrameRow>,
     ) -> anyhow::Result<ControlFlow<()>> {
-        if self.is_quiet {
+        if self.is_silent {
             return Ok(ControlFlow::Continue(()));
         }
         let is_first = self.reports == 0;
@@ -63,7 +64,7 @@ impl Printer {
 
     /// Prints what follows the last report.
     pub(super) fn finish(&mut self, tally: &Tally) -> anyhow::Result<ControlFlow<()>> {
-        if self.is_quiet || self.format != ReportFormat::Table {
+        if self.is_silent || self.format != ReportFormat::Table {
             return Ok(ControlFlow::Continue(()));
         }
         print(&self.summary.text(tally))
