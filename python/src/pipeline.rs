@@ -93,13 +93,13 @@ impl Pipeline {
         &self,
         py: Python<'_>,
         centroids: PyReadonlyArray2<'_, f64>,
-        shape: [usize; 2],
+        shape: Option<[usize; 2]>,
         brightness: Option<&str>,
         has_errors: bool,
         options: Options,
     ) -> PyResult<Solved> {
         let rows = centroids.as_slice().map_err(exception)?.as_chunks::<4>().0;
-        let [height, width] = shape;
+        let [height, width] = shape.map_or([None; 2], |shape| shape.map(Some));
         let centroid = |(rank, &[x, y, value, sigma_px]): (usize, &[f64; 4])| {
             let (mag, flux) = match brightness {
                 Some("flux") => (instrumental_mag(value), Some(value)),
@@ -124,7 +124,7 @@ impl Pipeline {
             let name = Path::new("centroids");
             let mut workspace = self.workspace(NonZeroUsize::MIN, interrupt);
             let solution = solve_guarded(name, &mut workspace, |workspace| {
-                Ok::<_, Failed>(solve_centroids(&list, &context, workspace))
+                Ok::<_, Failed>(solve_centroids(&list, &context, workspace)?)
             });
             self.keep(workspace);
             let solution = solution.map_err(|Failed(error)| error)?;

@@ -129,7 +129,7 @@ class Pipeline:
         x: ArrayLike,
         y: ArrayLike,
         *,
-        shape: tuple[int, int],
+        shape: tuple[int, int] | None = None,
         flux: ArrayLike | None = None,
         mag: ArrayLike | None = None,
         error: ArrayLike | None = None,
@@ -141,8 +141,10 @@ class Pipeline:
         ----------
         x, y : array
             Positions in pixels: (0, 0) is the centre of the first pixel.
-        shape : (int, int)
-            Rows and columns of the frame.
+        shape : (int, int), optional
+            Rows and columns of the frame; those of the pipeline's camera by default. Without a camera the
+            frame is as large as the centroids reach, `notes` tell of it, and the errors have that the
+            frame's centre is not known.
         flux, mag : array, optional
             Brightness, linear or in magnitudes: one of them. Without it the positions are in order
             of brightness.
@@ -162,7 +164,8 @@ class Pipeline:
         Raises
         ------
         ValueError
-            If arrays do not match, or an argument is out of range.
+            If arrays do not match, an argument is out of range, the shape is not that of the
+            pipeline's camera, or a position is more than 5 pixels outside the frame.
         TimeoutError
             If there is no answer within `time_limit`.
         """
@@ -182,9 +185,12 @@ class Pipeline:
             found = ", ".join(str(column.shape) for column in columns)
             raise ValueError(f"x, y, brightness and error must be lists of one length, not {found}")
         table = np.stack(columns, axis=-1)
-        rows, width = (whole_number(side, "shape", 3) for side in shape)
+        sides = None
+        if shape is not None:
+            rows, width = (whole_number(side, "shape", 3) for side in shape)
+            sides = (rows, width)
         solved = self._pipeline.identify(
-            table, (rows, width), brightness, error is not None, solve_options(**options)
+            table, sides, brightness, error is not None, solve_options(**options)
         )
         return _in_time(solved, None)
 

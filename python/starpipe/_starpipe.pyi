@@ -80,7 +80,7 @@ class Pipeline:
     def identify(
         self,
         centroids: NDArray[np.float64],
-        shape: tuple[int, int],
+        shape: tuple[int, int] | None,
         brightness: str | None,
         has_errors: bool,
         options: dict[str, Any],

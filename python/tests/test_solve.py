@@ -89,6 +89,25 @@ def test_centroids_are_identified(pipeline, pixels, result):
     np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-5)
 
 
+def test_the_shape_of_a_list_is_the_cameras_or_guessed(pipeline, frame, result):
+    stars = result.star_columns
+    left = stars["x"] < 480.0
+    x, y, flux = (stars[name][left] for name in ("x", "y", "flux"))
+    with_camera = sp.Pipeline(camera=frame.parent / "camera.toml")
+    found = with_camera.identify(x, y, flux=flux)
+    assert (found.to_dict()["height"], found.to_dict()["width"]) == (384, 512)
+    assert found == with_camera.identify(x, y, flux=flux, shape=(384, 512))
+    with pytest.raises(ValueError, match="512 × 384"):
+        with_camera.identify(x, y, flux=flux, shape=(384, 500))
+    with pytest.raises(ValueError, match="outside the frame"):
+        pipeline.identify(x, y, flux=flux, shape=(384, 400))
+    guessed = pipeline.identify(x, y, flux=flux)
+    assert guessed.to_dict()["width"] < 512
+    assert "size_guessed" in [note["code"] for note in guessed.to_dict()["notes"]]
+    wide, known = (np.diag(one.attitude_covariance) for one in (guessed, found))
+    assert (wide[:2] > 4.0 * known[:2]).all()
+
+
 def test_many_frames_come_in_order_and_errors_in_their_place(pipeline, pixels, result, tmp_path):
     found = pipeline.solve_many([pixels, pixels[:, ::-1], pixels] * 3, threads=2)
     for number, one in enumerate(found):

@@ -39,6 +39,9 @@ pub struct FrameRow {
     pub sigma_x_arcsec: Option<f64>,
     pub sigma_y_arcsec: Option<f64>,
     pub sigma_roll_arcsec: Option<f64>,
+    pub covariance_x_y_arcsec2: Option<f64>,
+    pub covariance_x_roll_arcsec2: Option<f64>,
+    pub covariance_y_roll_arcsec2: Option<f64>,
     pub fov_x_deg: Option<f64>,
     pub fov_y_deg: Option<f64>,
     pub focal_length_px: Option<f64>,
@@ -130,6 +133,7 @@ impl FrameRow {
         };
         let [qw, qx, qy, qz] = attitude.quaternion.map(Some);
         let sigma = &attitude.sigma_arcsec;
+        let [covariance_x, covariance_y, _] = attitude.covariance_arcsec2;
         Self {
             ra_deg: Some(attitude.ra_deg),
             dec_deg: Some(attitude.dec_deg),
@@ -141,6 +145,9 @@ impl FrameRow {
             sigma_x_arcsec: Some(sigma.x),
             sigma_y_arcsec: Some(sigma.y),
             sigma_roll_arcsec: Some(sigma.roll),
+            covariance_x_y_arcsec2: Some(covariance_x[1]),
+            covariance_x_roll_arcsec2: Some(covariance_x[2]),
+            covariance_y_roll_arcsec2: Some(covariance_y[2]),
             fov_x_deg: optics.fov_x_deg,
             fov_y_deg: optics.fov_y_deg,
             focal_length_px: Some(optics.focal_length_px),
@@ -203,6 +210,9 @@ impl FrameRow {
             sigma_x_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the x axis";
             sigma_y_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the y axis";
             sigma_roll_arcsec, "arcsec", "stat.error;pos.posAng", "standard error of the rotation about the boresight";
+            covariance_x_y_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x and y axes";
+            covariance_x_roll_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x axis and the boresight";
+            covariance_y_roll_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the y axis and the boresight";
             fov_x_deg, "deg", "phys.angSize;instr.fov", "horizontal field of view";
             fov_y_deg, "deg", "phys.angSize;instr.fov", "vertical field of view";
             focal_length_px, "pix", "instr.param", "focal length over pixel pitch";

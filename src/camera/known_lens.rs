@@ -3,6 +3,7 @@
 use super::distortion::DistortionModel;
 use super::model::CameraModel;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::base::size::Size;
 use crate::base::units::DEG_PER_RAD;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::fmt::Write as _;
@@ -67,6 +68,14 @@ impl KnownLens {
     /// Standard error of the focal length, in pixels.
     pub fn focal_length_sigma_px(&self) -> f64 {
         self.covariance[(0, 0)].sqrt() * self.camera.focal_length_px()
+    }
+
+    /// Size of the frames that it was measured in.
+    pub(crate) fn size(&self) -> Size {
+        Size::new(
+            self.camera.width_px as usize,
+            self.camera.height_px as usize,
+        )
     }
 
     /// Whether frames of this size are of the lens's camera.

@@ -10,6 +10,7 @@
 
 pub mod data_sheet;
 mod distortion;
+mod frame_size;
 mod known_lens;
 mod model;
 mod plausible;
@@ -17,6 +18,8 @@ mod projection;
 
 pub use distortion::{Distortion, DistortionModel, LENS_TERMS};
 pub(crate) use distortion::{MAX_TERMS, MONOMIALS, Observed, monomials};
+pub use frame_size::FrameSizeError;
+pub(crate) use frame_size::agreed_size;
 pub use known_lens::KnownLens;
 pub use model::CameraModel;
 #[doc(hidden)]

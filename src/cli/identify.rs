@@ -6,6 +6,7 @@ use super::options::values::MAX_SIDE_PX;
 use super::solving::options::SolvingOptions;
 use super::solving::{Inputs, Plan, report_all};
 use clap::Args;
+use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::pipeline::CentroidListOptions;
 use std::path::PathBuf;
 
@@ -21,10 +22,10 @@ pub(crate) struct IdentifyArgs {
     /// Lists of centroids to identify; - for standard input
     #[arg(value_name = "CENTROIDS.csv", required = true)]
     lists: Vec<PathBuf>,
-    /// Width of the frame in pixels [default: as far as the centroids reach]
+    /// Width of the frame in pixels [default: that of --camera, else as far as the centroids reach]
     #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
     width: Option<u32>,
-    /// Height of the frame in pixels [default: as far as the centroids reach]
+    /// Height of the frame in pixels [default: that of --camera, else as far as the centroids reach]
     #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
     height: Option<u32>,
     /// Frame whose rows to use, in a table of starpipe process of several frames
@@ -44,14 +45,28 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
         solving,
     } = arguments;
     stdin::check_once(&lists)?;
+    let camera = solving.hints.description()?;
+    let mut options = CentroidListOptions::default();
+    [options.width, options.height] = frame_size([width, height], camera.as_ref())?;
+    options.frame = frame;
     let plan = Plan {
         options: solving.options()?,
-        camera: solving.hints.description()?,
+        camera,
         ..Plan::default()
     };
-    let mut options = CentroidListOptions::default();
-    options.width = width;
-    options.height = height;
-    options.frame = frame;
     Ok(report_all(&Inputs::Lists(options), &lists, solving, &plan)?.into())
+}
+
+/// The size of the frames, as far as it is stated or the camera tells it.
+fn frame_size(
+    stated: [Option<u32>; 2],
+    camera: Option<&CameraDescription>,
+) -> Result<[Option<u32>; 2], CommandError> {
+    let Some(camera) = camera else {
+        return Ok(stated);
+    };
+    let size = camera
+        .frame_size(stated.map(|side| side.map(|side| side as usize)))
+        .map_err(|error| CommandError::usage(format!("--width, --height, --camera: {error}")))?;
+    Ok(size.map(|side| side.and_then(|side| u32::try_from(side).ok())))
 }

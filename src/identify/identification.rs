@@ -5,7 +5,7 @@ use crate::camera::CameraModel;
 use crate::identify::field::SourceIndex;
 use crate::sky::catalog::StarIndex;
 use crate::sky::places::{AttitudeFrame, StarPlaces};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Fewest stars that can be identified: a triangle, and one star that confirms it.
@@ -28,6 +28,8 @@ pub struct Identification {
     pub attitude_covariance_rad2: Matrix3<f64>,
     /// Standard error of the focal length, in pixels.
     pub focal_length_sigma_px: f64,
+    /// Standard error of the frame's centre along x and y, in pixels: 0 unless the frame's size is a guess.
+    pub centre_sigma_px: [f64; 2],
     /// Standard deviation on each axis, in pixels, that the stated centroid errors lack to explain
     /// the residuals: the error of the lens model, and of spots that are not the detector's. The
     /// errors of attitude and focal length include it.
@@ -41,7 +43,73 @@ pub struct Identification {
     pub log10_false_alarm: f64,
 }
 
+/// How far the centre of a frame may lie beyond the pixel that it is taken to be, along x and y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct UnknownCentre {
+    /// Mean, in pixels.
+    pub mean_px: Vector2<f64>,
+    /// Mean square.
+    pub square_px2: Vector2<f64>,
+}
+
 impl Identification {
+    /// Adds the errors of a frame whose centre is not known: the attitude of a pinhole is that of the
+    /// centre. That of any other lens is of its axis, which the stars tell.
+    pub(crate) fn add_unknown_centre(&mut self, centre: &UnknownCentre) {
+        /// The scale in the centre of a pinhole changes by this times the square of the angle from the axis.
+        const SCALE: f64 = 0.75;
+        self.centre_sigma_px = centre.square_px2.map(f64::sqrt).into();
+        if !self.camera.is_pinhole() {
+            return;
+        }
+        let focal_px = self.camera.central_focal_length_px();
+        let mean_rad = centre.mean_px / focal_px;
+        let square_rad2 = centre.square_px2 / (focal_px * focal_px);
+        // A centre farther along x is a turn about y, one farther along y a turn about −x.
+        let along_x = if self.camera.mirrored { -1.0 } else { 1.0 };
+        let covariance = &mut self.attitude_covariance_rad2;
+        covariance[(0, 0)] += square_rad2.y;
+        covariance[(1, 1)] += square_rad2.x;
+        let common = -along_x * mean_rad.x * mean_rad.y;
+        covariance[(0, 1)] += common;
+        covariance[(1, 0)] += common;
+        let scale = SCALE * square_rad2.sum();
+        self.focal_length_sigma_px = libm::hypot(self.focal_length_sigma_px, scale * focal_px);
+    }
+
+    /// Standard errors of the fields of view along x and y, in radians, from those of the focal length and
+    /// of the frame's size; `None` where an edge does not see the sky.
+    pub fn fov_sigma_rad(&self) -> [Option<f64>; 2] {
+        let camera = &self.camera;
+        let share = self.focal_length_sigma_px / camera.central_focal_length_px();
+        let longer = camera.with_focal_length(camera.focal_length_px() * (1.0 + share));
+        let centre = camera.centre();
+        let [right, lower] = [camera.width_px - 0.5, camera.height_px - 0.5];
+        let edges = [
+            [
+                PixelPoint::new(right, centre.y),
+                PixelPoint::new(right - 1.0, centre.y),
+            ],
+            [
+                PixelPoint::new(centre.x, lower),
+                PixelPoint::new(centre.x, lower - 1.0),
+            ],
+        ];
+        let fields = [
+            [camera.fov_x_rad(), longer.fov_x_rad()],
+            [camera.fov_y_rad(), longer.fov_y_rad()],
+        ];
+        [0, 1].map(|axis| {
+            let [field, with_longer] = fields[axis];
+            let of_scale = field? - with_longer?;
+            let [edge, inside] = edges[axis].map(|pixel| camera.direction_of(&pixel));
+            let pixel_rad = libm::acos(edge?.dot(&inside?).min(1.0));
+            // The centre is off by half of what the side is.
+            let of_side = 2.0 * self.centre_sigma_px[axis] * pixel_rad;
+            Some(libm::hypot(of_scale, of_side))
+        })
+    }
+
     /// Adds an error of the positions that all of them share, in pixels on each axis: only the attitude
     /// follows it.
     pub fn add_common_error(&mut self, sigma_px: f64) {

@@ -40,6 +40,7 @@ pub(crate) use field::CoarserFields;
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
 #[doc(hidden)]
 pub use identification::MIN_STARS;
+pub(crate) use identification::UnknownCentre;
 pub use identification::{Identification, SearchFailure, StarMatch};
 pub use index::IndexedCatalog;
 #[doc(hidden)]

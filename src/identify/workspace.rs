@@ -613,6 +613,7 @@ fn identification(
     Identification {
         attitude_covariance_rad2: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
         focal_length_sigma_px: covariance[(3, 3)].sqrt() * fit.camera.central_focal_length_px(),
+        centre_sigma_px: [0.0; 2],
         camera: known_part(&fit.camera, &fit.icrs_to_camera, &matches),
         icrs_to_camera: fit.icrs_to_camera,
         places,

@@ -233,6 +233,7 @@ mod tests {
             icrs_to_camera: Rotation::looking_at(&centre, 0.0),
             attitude_covariance_rad2: Matrix3::zeros(),
             focal_length_sigma_px: 0.0,
+            centre_sigma_px: [0.0; 2],
             excess_sigma_px: 0.0,
             matches: matches.collect(),
             rms_px: 0.2,

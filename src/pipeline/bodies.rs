@@ -192,6 +192,7 @@ mod tests {
             icrs_to_camera,
             attitude_covariance_rad2: Matrix3::zeros(),
             focal_length_sigma_px: 0.1,
+            centre_sigma_px: [0.0; 2],
             excess_sigma_px: 0.0,
             matches: matches.collect(),
             rms_px: 0.3,

@@ -1,14 +1,17 @@
 //! Lists of centroids, and their identification.
 
 use super::bodies::find_bodies;
+use super::centroid_table::CentroidListError;
 use super::context::{Context, Workspace};
-use super::identification::{identified, observation, search, through_air_or_not};
+use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
 use super::left_out::{LeftOut, RowProblem};
+use super::list_frame::{ListFrame, reached_size};
 use super::note::Note;
 use super::place_time::{Settled, settle};
 use super::solution::{Solution, Source};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::coords::PixelPoint;
+use crate::base::size::Size;
 use crate::detect::DetectionFlags;
 use crate::identify::{
     ObservedStar, Photometry, Priors, ScalePrior, ScaleSource, SourceIndex, StarField,
@@ -25,10 +28,11 @@ const COINCIDENT_PX: f64 = LISTED_SIGMA_PX;
 /// A list of centroids.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CentroidList {
-    /// Columns of the frame that they come from.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
+    /// Columns of the frame that they come from, where they are stated. Else they are the camera's, and
+    /// without a camera as many as the centroids reach.
+    pub width: Option<usize>,
+    /// Rows, likewise.
+    pub height: Option<usize>,
     /// What the magnitudes are.
     pub photometry: Photometry,
     /// Whether the brightnesses are known. If not, the magnitudes give their order alone.
@@ -66,6 +70,11 @@ impl ListedCentroid {
             flags: DetectionFlags::default(),
             row: 0,
         }
+    }
+
+    /// Standard error on one axis, stated or assumed, in pixels.
+    pub(super) fn error_px(&self) -> f64 {
+        self.sigma_px.unwrap_or(LISTED_SIGMA_PX)
     }
 
     /// A magnitude for the star of this rank, from 0, in a list that is in order of brightness.
@@ -116,21 +125,26 @@ impl CentroidList {
         (list, LeftOut::of(&problems))
     }
 
-    /// The star field of a list that is sorted by brightness, observed this many Julian years after
-    /// J2000.0.
+    /// The star field of a list that is sorted by brightness; `places` is where the catalogue's stars
+    /// appear. A side of the frame that is not stated is as long as the centroids reach.
     pub fn star_field(&self, places: StarPlaces) -> StarField {
+        self.star_field_in(reached_size(self, [self.width, self.height]), places)
+    }
+
+    /// The same in a frame of this size.
+    pub(super) fn star_field_in(&self, size: Size, places: StarPlaces) -> StarField {
         let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
             source: SourceIndex::new(line),
             position: centroid.position,
-            sigma_px: centroid.sigma_px.unwrap_or(LISTED_SIGMA_PX),
+            sigma_px: centroid.error_px(),
             mag: centroid.mag,
             is_saturated: centroid.flags.saturated,
         };
         let lines = self.centroids.iter().enumerate();
         let stars = lines.filter(|(_, centroid)| centroid.flags.is_star_like());
         StarField {
-            width_px: self.width as f64,
-            height_px: self.height as f64,
+            width_px: size.width as f64,
+            height_px: size.height as f64,
             photometry: self.photometry,
             places,
             spot_sigma_px: None,
@@ -162,6 +176,13 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
 
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.
 ///
+/// Where nobody states the size of the frame, it is as large as the centroids reach, and the errors have
+/// that its centre is not known.
+///
+/// # Errors
+/// [`CentroidListError`] where the stated size is not that of the context's camera, or a centroid lies
+/// outside the frame.
+///
 /// # Example
 /// ```
 /// use starpipe::identify::Photometry;
@@ -181,35 +202,38 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
 ///     camera.contains(&pixel).then_some(listed)
 /// });
 /// let list = CentroidList {
-///     width: 1024,
-///     height: 768,
+///     width: Some(1024),
+///     height: Some(768),
 ///     photometry: Photometry::JohnsonV,
 ///     has_brightness: true,
 ///     centroids: centroids.collect(),
 /// };
-/// let solution = solve_centroids(&list, &Context::new(&indexed), &mut Workspace::new());
+/// let solution = solve_centroids(&list, &Context::new(&indexed), &mut Workspace::new())?;
 /// let found = solution.outcome.identification().expect("the stars are identified");
 /// assert!(found.icrs_to_camera.angle_to(&attitude) < 1e-5);
+/// # Ok::<(), starpipe::pipeline::CentroidListError>(())
 /// ```
 pub fn solve_centroids(
     list: &CentroidList,
     context: &Context,
     workspace: &mut Workspace,
-) -> Solution {
+) -> Result<Solution, CentroidListError> {
     let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
         source: ScaleSource::User,
         ..ScalePrior::of_camera(&camera.sheet)
     });
-    let lens = context.lens_of(list.width, list.height);
+    let (list, left_out) = list.usable();
+    let frame = ListFrame::of(&list, &context.camera_sizes())?;
+    let [width, height] = frame.size.sides();
+    let lens = context.lens_of(width, height);
     let lens_scale = lens.map(ScalePrior::of_lens);
     let priors = &Priors {
         scale: context.priors.scale.or(lens_scale).or(of_camera),
         holds_lens: lens.is_some(),
         ..context.priors
     };
-    let (list, left_out) = list.usable();
     let source = |centroid: &ListedCentroid| Source {
         position: centroid.position,
         measured: None,
@@ -218,7 +242,7 @@ pub fn solve_centroids(
     let sources: Vec<Source> = list.centroids.iter().map(source).collect();
     let catalog = context.indexed.catalog();
     let mut identify = |places| {
-        let field = list.star_field(places);
+        let field = list.star_field_in(frame.size, places);
         let workspace = &mut workspace.identify;
         let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
         identified(found, None, &field, priors, context.indexed)
@@ -234,6 +258,13 @@ pub fn solve_centroids(
         through_air_or_not(places, &mut identify)
     });
     let priors = &priors;
+    let second_images = if context.attitude_only {
+        SecondImages::default()
+    } else {
+        let field = list.star_field_in(frame.size, priors.places());
+        SecondImages::of(&mut outcome, &field)
+    };
+    frame.add_unknown_centre(&list, &mut outcome);
     let observation = observation(&outcome, priors);
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
     clock.lap(Stage::Identify);
@@ -241,15 +272,19 @@ pub fn solve_centroids(
     let note = Note::of_place_time(place_time.as_ref()).chain(note);
     let notes = left_out.into_iter().map(Note::RowsLeftOut);
     let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
-    let notes = notes.chain(unknown).chain(note);
+    let guessed = Note::of_guessed_size(&frame, outcome.identification());
+    let notes = notes.chain(unknown).chain(guessed).chain(note);
+    let notes = notes
+        .chain(second_images.double.map(Note::DoubleImage))
+        .chain(second_images.repeated.map(Note::RepeatedSky));
     let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
     let notes = notes.chain(Note::of_residuals(outcome.identification()));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
     let notes = notes.chain(Note::of_lens(context.lens.as_deref(), &outcome));
     let notes = notes.chain(Note::of_date(priors, &outcome));
-    Solution {
-        width: list.width,
-        height: list.height,
+    Ok(Solution {
+        width,
+        height,
         row_order: None,
         date: priors.date,
         notes: notes.collect(),
@@ -271,5 +306,5 @@ pub fn solve_centroids(
         gain_e_per_adu: None,
         calibration: None,
         timing: clock.timing(),
-    }
+    })
 }

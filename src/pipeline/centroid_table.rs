@@ -1,13 +1,13 @@
 //! Lists of centroids as tables.
 
 use super::centroid_columns::{Brightness, Columns};
-use super::centroid_list::{CentroidList, ListedCentroid};
+use super::centroid_list::CentroidList;
 use super::centroid_text::ListText;
 use crate::base::coords::PixelPoint;
 use crate::base::files;
 use crate::base::format::{excerpt, table_name};
 use crate::base::remedy::Remedy;
-use crate::base::size::Size;
+use crate::camera::FrameSizeError;
 use crate::identify::Photometry;
 use std::fmt;
 
@@ -40,6 +40,14 @@ impl CentroidListError {
         }
     }
 
+    /// The problem of a row, from 1; 0 is one that is not known.
+    pub(super) fn of_row(row: u64, problem: String) -> Self {
+        Self::of_list(match row {
+            0 => problem,
+            row => format!("row {row}: {problem}"),
+        })
+    }
+
     fn of_list(problem: impl Into<String>) -> Self {
         Self {
             line: None,
@@ -54,11 +62,17 @@ impl CentroidListError {
     }
 }
 
+impl From<FrameSizeError> for CentroidListError {
+    fn from(error: FrameSizeError) -> Self {
+        Self::of_list(error.to_string())
+    }
+}
+
 /// What is known of a list besides its content.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct CentroidListOptions {
-    /// Width of the frame in pixels.
+    /// Width of the frame in pixels, stated or its camera's.
     pub width: Option<u32>,
     /// Its height.
     pub height: Option<u32>,
@@ -90,6 +104,7 @@ impl CentroidList {
         let rows = || self::reader(&text, separator).into_records().flatten();
         let columns =
             Columns::find(headings, separator, rows).map_err(CentroidListError::of_list)?;
+        let size = [options.width, options.height].map(|side| side.map(|side| side as usize));
         let mut centroids = Vec::new();
         // The problem of the first row that is not usable, with its line.
         let mut first_problem = None;
@@ -109,7 +124,7 @@ impl CentroidList {
             let mut centroid = columns.centroid(&record, centroids.len());
             centroid.row = line;
             if centroid.problem().is_none() {
-                check_inside(&centroid.position, options)
+                check_inside(&centroid.position, size)
                     .map_err(|problem| CentroidListError::of_line(line, problem))?;
             } else if first_problem.is_none() {
                 first_problem = columns.problem(&record).map(|problem| (line, problem));
@@ -126,7 +141,7 @@ impl CentroidList {
                 None => CentroidListError::of_list("found a heading without centroids below it"),
             });
         }
-        let Size { width, height } = frame_size(&centroids, options);
+        let [width, height] = size;
         Ok(Self {
             width,
             height,
@@ -222,15 +237,15 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// Refuses positions outside the frame, which extends half a pixel beyond the centres of its border
-/// pixels.
-fn check_inside(position: &PixelPoint, size: &CentroidListOptions) -> Result<(), String> {
-    let axes = [
-        ("x", position.x, size.width),
-        ("y", position.y, size.height),
-    ];
+/// Refuses positions outside a frame of this width and height, as far as they are known. It extends half a
+/// pixel beyond the centres of its border pixels.
+pub(super) fn check_inside(
+    position: &PixelPoint,
+    [width, height]: [Option<usize>; 2],
+) -> Result<(), String> {
+    let axes = [("x", position.x, width), ("y", position.y, height)];
     for (name, value, side) in axes {
-        let limit = side.map_or(MAX_COORDINATE_PX, f64::from) - 0.5;
+        let limit = side.map_or(MAX_COORDINATE_PX, |side| side as f64) - 0.5;
         if !(-0.5 - BORDER_PX..=limit + BORDER_PX).contains(&value) {
             return Err(format!(
                 "column {name}: {value} is more than {BORDER_PX} px outside the frame, which extends from -0.5 to {limit} px"
@@ -240,29 +255,20 @@ fn check_inside(position: &PixelPoint, size: &CentroidListOptions) -> Result<(),
     Ok(())
 }
 
-/// The size of the frame: as given, else as far as the centroids reach.
-fn frame_size(centroids: &[ListedCentroid], size: &CentroidListOptions) -> Size {
-    let reach = |coordinate: fn(&PixelPoint) -> f64| {
-        let usable = centroids.iter().filter(|c| c.problem().is_none());
-        let largest = usable.map(|c| coordinate(&c.position)).fold(0.0, f64::max);
-        largest.round() as usize + 1
-    };
-    let given = |side: Option<u32>| side.map(|side| side as usize);
-    Size::new(
-        given(size.width).unwrap_or_else(|| reach(|p| p.x)),
-        given(size.height).unwrap_or_else(|| reach(|p| p.y)),
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::detect::DetectionFlags;
     use crate::pipeline::LeftOut;
+    use crate::pipeline::list_frame::ListFrame;
     use crate::sky::places::StarPlaces;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
         CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())
+    }
+
+    fn guessed(list: &CentroidList) -> [usize; 2] {
+        ListFrame::of(list, &[]).unwrap().size.sides()
     }
 
     fn error(text: &str) -> String {
@@ -275,7 +281,7 @@ mod tests {
         assert_eq!(list.photometry, Photometry::JohnsonV);
         assert_eq!(list.centroids[0].position, PixelPoint::new(10.6, 20.2));
         assert_eq!(list.centroids[0].mag, 6.5);
-        assert_eq!((list.width, list.height), (12, 21));
+        assert_eq!(guessed(&list), [12, 21]);
     }
 
     #[test]
@@ -372,7 +378,7 @@ mod tests {
         let (usable, left_out) = list.usable();
         let places: Vec<f64> = usable.centroids.iter().map(|c| c.position.x).collect();
         assert_eq!(places, [8.0, 5.0]);
-        assert_eq!((list.width, list.height), (9, 9));
+        assert_eq!(guessed(&usable), [9, 9]);
         let texts: Vec<String> = left_out.iter().map(LeftOut::to_string).collect();
         assert_eq!(
             texts,
@@ -466,14 +472,14 @@ mod tests {
             CentroidList::parse("x,y,mag\n99.4,2,3\n105,2,3\n".as_bytes(), &size).unwrap_err();
         assert!(format!("{error}").starts_with("line 3: column x: 105 is more than 5 px outside"));
         let list = CentroidList::parse("x,y,mag\n9,2,3\n".as_bytes(), &size).unwrap();
-        assert_eq!((list.width, list.height), (100, 3));
+        assert_eq!(guessed(&list), [100, 3]);
     }
 
     #[test]
     fn a_star_on_the_border_may_have_its_centre_outside() {
         let list = parsed("x,y,mag\n-1.2,2,3\n9,-5.5,3\n").unwrap();
         assert_eq!(list.centroids.len(), 2);
-        assert_eq!((list.width, list.height), (10, 3));
+        assert_eq!(guessed(&list), [10, 3]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::held::HeldCamera;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
 use crate::base::interrupt::Interrupt;
+use crate::base::size::Size;
 use crate::calibration::Calibration;
 use crate::camera::KnownLens;
 use crate::detect::{self, DetectConfig};
@@ -35,6 +36,9 @@ pub struct Context<'a> {
     pub camera: Option<ObservingSetup>,
     /// The lens with which they were taken, where it was measured.
     pub lens: Option<Arc<KnownLens>>,
+    /// The sizes of the camera's frames, besides those of `camera` and `lens`.
+    #[doc(hidden)]
+    pub frame_sizes: Vec<Size>,
     /// What local times in names of files and in Exif are ahead of UTC, where it is known.
     pub utc_offset: Option<UtcOffset>,
     /// How the camera stands, where it does not move: tried first.
@@ -78,6 +82,7 @@ impl<'a> Context<'a> {
             priors: Priors::default(),
             camera: None,
             lens: None,
+            frame_sizes: Vec::new(),
             utc_offset: None,
             held: None,
             calibration: None,
@@ -134,6 +139,14 @@ impl<'a> Context<'a> {
     pub(super) fn lens_of(&self, width_px: usize, height_px: usize) -> Option<&KnownLens> {
         let lens = self.lens.as_deref();
         lens.filter(|lens| lens.is_of_size(width_px as f64, height_px as f64))
+    }
+
+    /// The sizes that frames of the camera have, as far as the camera and its lens are known.
+    pub(super) fn camera_sizes(&self) -> Vec<Size> {
+        let of_sheet = self.camera.as_ref().map(|camera| camera.sheet.size());
+        let of_lens = self.lens.as_deref().map(KnownLens::size);
+        let known = of_sheet.into_iter().chain(of_lens);
+        known.chain(self.frame_sizes.iter().copied()).collect()
     }
 
     /// How to detect stars in one frame: pixels at the stated camera's full well are saturated.

@@ -47,6 +47,9 @@ pub enum Error {
         /// What does not fit.
         source: CalibrationError,
     },
+    /// A list of centroids cannot be understood.
+    #[error("reading the centroids")]
+    List(#[from] CentroidListError),
     /// Something that works on the frame has a bug.
     #[error("solving {}", path.display())]
     Panicked {

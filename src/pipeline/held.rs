@@ -85,6 +85,7 @@ impl HeldCamera {
             lens_is_known: true,
             attitude_covariance_rad2: Matrix3::from_diagonal_element(self.sigma_rad.powi(2)),
             focal_length_sigma_px: 0.0,
+            centre_sigma_px: [0.0; 2],
             excess_sigma_px: 0.0,
             matches,
             rms_px: radius_px,

@@ -9,11 +9,12 @@ use crate::detect::{self, DetectConfig, Detection, Detections, detect};
 use crate::frame::Frame;
 use crate::identify;
 use crate::identify::diagnosis::{
-    Diagnosis, DoubleImage, Unidentified, diagnose, find_double_image,
+    Diagnosis, DoubleImage, RepeatedSky, Unidentified, diagnose, find_double_image,
+    find_repeated_sky,
 };
 use crate::identify::{
-    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, Priors, ScalePrior,
-    SearchFailure, SourceIndex, StarField,
+    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Priors,
+    ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use crate::sky::observer::Observation;
 use crate::sky::places::{AttitudeFrame, StarPlaces};
@@ -105,17 +106,37 @@ fn is_credible_in_air(found: &Identification) -> bool {
     is_high && found.excess_sigma_px < RESIDUAL_PX
 }
 
-/// Whether every star of an identified frame is there twice. Then the attitude is that of one of the
-/// images, or lies between them, and its error gets half of the way from one to the other.
-pub(super) fn double_image(outcome: &mut Outcome, field: &StarField) -> Option<DoubleImage> {
-    let Outcome::Identified(found) = outcome else {
-        return None;
-    };
-    let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
-    let double = find_double_image(field, |star| named.contains(&star.source))?;
-    let [x, y] = double.offset_px;
-    found.add_common_error(libm::hypot(x, y) / 2.0);
-    Some(double)
+/// How the stars of an identified frame stand in it once more.
+#[derive(Default)]
+pub(super) struct SecondImages {
+    /// Every star is there twice.
+    pub double: Option<DoubleImage>,
+    /// Their pattern is there again.
+    pub repeated: Option<RepeatedSky>,
+}
+
+impl SecondImages {
+    /// Those of a frame with these stars. Where every star is there twice, the attitude is that of one of
+    /// the images, or lies between them, and its error gets half of the way from one to the other.
+    pub fn of(outcome: &mut Outcome, field: &StarField) -> Self {
+        let Outcome::Identified(found) = outcome else {
+            return Self::default();
+        };
+        let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
+        let is_named = |star: &ObservedStar| named.contains(&star.source);
+        let double = find_double_image(field, is_named);
+        if let Some(double) = &double {
+            let [x, y] = double.offset_px;
+            found.add_common_error(libm::hypot(x, y) / 2.0);
+        }
+        let is_single = double.is_none();
+        Self {
+            double,
+            repeated: is_single
+                .then(|| find_repeated_sky(field, is_named))
+                .flatten(),
+        }
+    }
 }
 
 /// Whether most of the brightest detections are wider than the spot: then it may be that of specks,

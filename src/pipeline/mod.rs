@@ -23,6 +23,7 @@ mod error;
 mod held;
 mod identification;
 mod left_out;
+mod list_frame;
 mod note;
 mod options;
 mod outcome;

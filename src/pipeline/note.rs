@@ -3,6 +3,7 @@
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
 use super::left_out::LeftOut;
+use super::list_frame::ListFrame;
 use super::outcome::Outcome;
 use super::place_time::PlaceTime;
 use super::raw_color::RawColor;
@@ -15,7 +16,7 @@ use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Trail, 
 use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
-use crate::identify::diagnosis::DoubleImage;
+use crate::identify::diagnosis::{DoubleImage, RepeatedSky};
 use crate::identify::{DateZone, Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, ObservingSetup};
@@ -47,6 +48,14 @@ pub enum Note {
     RowsLeftOut(LeftOut),
     /// A list has no brightnesses; its rows were taken to be in their order.
     BrightnessUnknown,
+    /// Nobody states the size of a list's frame, and so it is as large as the centroids reach.
+    SizeGuessed {
+        /// Columns and rows that it is taken to have.
+        size_px: [usize; 2],
+        /// Standard error of the frame's centre along x and y, in pixels; 0 where the side is known. `None`
+        /// where the frame is not identified.
+        centre_sigma_px: Option<[f64; 2]>,
+    },
     /// Columns hold one value instead of light, and were left out.
     DefectiveColumns(Vec<usize>),
     /// The frame is a raw one of a color camera: what its pixels and its zero point are of.
@@ -115,6 +124,8 @@ pub enum Note {
     Wings(Wings),
     /// Every star occurs twice.
     DoubleImage(DoubleImage),
+    /// The stars stand in the frame once more, as in a collage.
+    RepeatedSky(RepeatedSky),
     /// The dark has another exposure than the frame.
     DarkExposure(ExposureMismatch),
     /// The Moon or a planet is in the frame.
@@ -146,6 +157,7 @@ impl Note {
             Self::Assumed(assumption) => assumption.code(),
             Self::RowsLeftOut(_) => "rows_left_out",
             Self::BrightnessUnknown => "brightness_unknown",
+            Self::SizeGuessed { .. } => "size_guessed",
             Self::DefectiveColumns(_) => "defective_columns",
             Self::ColorMosaic(_) => "color_mosaic",
             Self::MoreStars { .. } => "more_stars",
@@ -168,6 +180,7 @@ impl Note {
             Self::Trails(_) => "trails",
             Self::Wings(_) => "wings",
             Self::DoubleImage(_) => "double_image",
+            Self::RepeatedSky(_) => "repeated_sky",
             Self::BodyInFrame(_) => "body_in_frame",
             Self::DarkExposure(_) => "dark_exposure_differs",
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
@@ -220,6 +233,17 @@ impl Note {
             .chain(orientation.map(Self::Orientation))
             .chain(ignored.map(Self::IgnoredHeader))
             .chain(assumed.map(Self::Assumed))
+    }
+
+    /// That the size of a list's frame is a guess.
+    pub(super) fn of_guessed_size(
+        frame: &ListFrame,
+        found: Option<&Identification>,
+    ) -> Option<Self> {
+        (frame.is_guessed != [false; 2]).then(|| Self::SizeGuessed {
+            size_px: frame.size.sides(),
+            centre_sigma_px: found.map(|found| found.centre_sigma_px),
+        })
     }
 
     /// Columns without light, where there are any.
@@ -308,9 +332,10 @@ impl Note {
         is_below.then_some(Self::BelowHorizon { depth_rad })
     }
 
-    /// The contradictions with the stated camera, or why it was not compared.
+    /// The contradictions of a frame of this size with the stated camera, or why it was not compared.
     pub(super) fn of_camera(
         camera: Option<&ObservingSetup>,
+        frame_px: [usize; 2],
         comparison: Option<&Comparison>,
     ) -> Vec<Self> {
         match (camera, comparison) {
@@ -320,7 +345,15 @@ impl Note {
                 .copied()
                 .map(Self::Camera)
                 .collect(),
-            (Some(_), None) => vec![Self::NoExposure],
+            (Some(camera), None) => {
+                let camera_px = camera.sheet.size().sides();
+                let size = Self::Camera(Contradiction::Size {
+                    frame_px,
+                    camera_px,
+                });
+                let size = (frame_px != camera_px).then_some(size);
+                size.into_iter().chain([Self::NoExposure]).collect()
+            }
             (None, None) => Vec::new(),
         }
     }
@@ -422,6 +455,24 @@ impl fmt::Display for Note {
                 depth_rad * DEG_PER_RAD
             ),
             Self::SiteOrTime(wrong) => wrong.fmt(f),
+            Self::SizeGuessed {
+                size_px: [width, height],
+                centre_sigma_px,
+            } => {
+                write!(
+                    f,
+                    "the size of the frame is not stated, and was taken to be {width} × {height} pixels, as \
+                     far as the centroids reach"
+                )?;
+                let Some([x, y]) = centre_sigma_px else {
+                    return Ok(());
+                };
+                write!(
+                    f,
+                    "; the true centre may be off by {x:.0} px along x and {y:.0} px along y, and the stated \
+                     errors include that"
+                )
+            }
             Self::MoreStars { wanted } => write!(
                 f,
                 "the brightest {wanted} detections, as many as were to be measured, did not identify the \
@@ -450,6 +501,7 @@ impl fmt::Display for Note {
                  two images, and positions and attitude are off by up to that offset: the stated error of the \
                  attitude has half of it"
             ),
+            Self::RepeatedSky(repeated) => repeated.fmt(f),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
             Self::BrightStarsNotNamed(stars) => {

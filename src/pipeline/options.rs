@@ -202,8 +202,11 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn with_options(self, options: &SolveOptions, camera: Option<CameraDescription>) -> Self {
         let limit_s = options.time_limit_s;
-        let CameraDescription { sheet, lens } = camera.unwrap_or_default();
+        let camera = camera.unwrap_or_default();
+        let frame_sizes = camera.sizes();
+        let CameraDescription { sheet, lens } = camera;
         Self {
+            frame_sizes,
             detect: options.detect_config(),
             priors: options.priors(),
             utc_offset: options.utc_offset,

@@ -3,7 +3,7 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
-use super::identification::{double_image, identify_stars, observation, through_air_or_not};
+use super::identification::{SecondImages, identify_stars, observation, through_air_or_not};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::place_time::{PlaceTime, Settled, settle};
@@ -232,10 +232,10 @@ fn solve(
     } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
-    let double_image = if context.attitude_only {
-        None
+    let second_images = if context.attitude_only {
+        SecondImages::default()
     } else {
-        double_image(&mut outcome, &star_field(frame, &detections, places))
+        SecondImages::of(&mut outcome, &star_field(frame, &detections, places))
     };
     clock.lap(Stage::Identify);
 
@@ -253,7 +253,7 @@ fn solve(
         sources,
         outcome,
         bodies,
-        double_image,
+        second_images,
         dropped_scale,
         more_stars,
         defects: &prepared.defects,

@@ -3,6 +3,7 @@
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::NamedFrame;
 use super::context::Context;
+use super::identification::SecondImages;
 use super::note::Note;
 use super::outcome::Outcome;
 use super::place_time::PlaceTime;
@@ -14,7 +15,6 @@ use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::{Detections, SkyArea, Trail};
 use crate::frame::{DefectiveColumn, Frame};
-use crate::identify::diagnosis::DoubleImage;
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::sky_map::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
@@ -42,8 +42,8 @@ pub(super) struct SolvedFrame<'a> {
     pub bodies: Vec<BodyInFrame>,
     /// Satellites, aeroplanes and meteors, where they were searched.
     pub trails: Option<Vec<Trail>>,
-    /// The second image of every star.
-    pub double_image: Option<DoubleImage>,
+    /// Stars that are there once more.
+    pub second_images: SecondImages,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
     /// The number of stars that were to be measured, where more had to be.
@@ -253,6 +253,7 @@ impl SolvedFrame<'_> {
             .calibration
             .and_then(|calibration| calibration.exposure_mismatch(priors.exposure_s));
         let observation = self.observation.as_ref();
+        let frame_px = [self.frame.width, self.frame.height];
         // What needs the names of all stars.
         let is_named = !self.context.attitude_only;
         let camera = self.context.camera.as_ref().filter(|_| is_named);
@@ -266,14 +267,15 @@ impl SolvedFrame<'_> {
             .chain(Note::of_place_time(self.place_time.as_ref()))
             .chain(Note::of_observation(observation, priors, outcome))
             .chain(Note::of_zone(priors, outcome))
-            .chain(Note::of_camera(camera, comparison))
+            .chain(Note::of_camera(camera, frame_px, comparison))
             .chain(Note::of_photometry(self.photometry.as_ref()))
             .chain(self.detections.noise_tail.map(Note::FalseDetections))
             .chain(self.detections.psf.map(Note::Spots))
             .chain(self.detections.trails.map(Note::StarTrails))
             .chain(Note::of_trails(self.trails.as_deref()))
             .chain(self.detections.wings.map(Note::Wings))
-            .chain(self.double_image.map(Note::DoubleImage))
+            .chain(self.second_images.double.map(Note::DoubleImage))
+            .chain(self.second_images.repeated.map(Note::RepeatedSky))
             .chain(Note::of_bodies(
                 &self.bodies,
                 outcome,

@@ -242,10 +242,10 @@ pub(super) fn attitude(
 ) -> AttitudeReport {
     let (boresight, up_pa_rad) = icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = boresight.to_ra_dec();
-    let sigma = |axis: usize| {
-        let sigma_rad = covariance_rad2[(axis, axis)].sqrt();
-        to_significant(sigma_rad * ARCSEC_PER_RAD, SIGMA_DIGITS)
-    };
+    let covariance = covariance_rad2 * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
+    let sigma = |axis: usize| to_significant(covariance[(axis, axis)].sqrt(), SIGMA_DIGITS);
+    let element =
+        |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
     let [x, y, roll] = [0, 1, 2].map(sigma);
     AttitudeReport {
         at,
@@ -255,6 +255,7 @@ pub(super) fn attitude(
         up_pa_deg: half_turn_deg(up_pa_rad * DEG_PER_RAD, DIRECTION_DECIMALS),
         quaternion: icrs_to_camera.to_quaternion().map(|q| to_decimals(q, 10)),
         sigma_arcsec: AttitudeSigma { x, y, roll },
+        covariance_arcsec2: [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column))),
     }
 }
 
@@ -271,10 +272,14 @@ fn optics(identification: &Identification) -> OpticsReport {
     let camera = &identification.camera;
     let axis = camera.axis();
     let degrees = |angle_rad: f64| to_decimals(angle_rad * DEG_PER_RAD, 6);
+    let [fov_x_sigma_rad, fov_y_sigma_rad] = identification.fov_sigma_rad();
+    let sigma_deg = |sigma_rad: f64| significant(sigma_rad * DEG_PER_RAD, SIGMA_DIGITS);
     OpticsReport {
         held: identification.lens_is_known,
         fov_x_deg: camera.fov_x_rad().map(degrees),
         fov_y_deg: camera.fov_y_rad().map(degrees),
+        fov_x_sigma_deg: fov_x_sigma_rad.and_then(sigma_deg),
+        fov_y_sigma_deg: fov_y_sigma_rad.and_then(sigma_deg),
         model: camera.projection().name(),
         focal_length_px: to_decimals(camera.central_focal_length_px(), PIXEL_DECIMALS),
         focal_length_sigma_px: finite(identification.focal_length_sigma_px, PIXEL_DECIMALS),

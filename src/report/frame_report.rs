@@ -212,6 +212,8 @@ pub struct AttitudeReport {
     pub quaternion: [f64; 4],
     /// Standard errors of the attitude.
     pub sigma_arcsec: AttitudeSigma,
+    /// Covariance of the small rotation about the camera's x, y and z axes, in square arcseconds.
+    pub covariance_arcsec2: [[f64; 3]; 3],
 }
 
 /// What shifts the places of the stars and was applied.
@@ -246,6 +248,10 @@ pub struct OpticsReport {
     pub fov_x_deg: Option<f64>,
     /// Angle between the middles of the upper and lower borders, in degrees.
     pub fov_y_deg: Option<f64>,
+    /// Standard error of `fov_x_deg`, in degrees.
+    pub fov_x_sigma_deg: Option<f64>,
+    /// Standard error of `fov_y_deg`, in degrees.
+    pub fov_y_sigma_deg: Option<f64>,
     /// Name of the [`Projection`](crate::camera::Projection).
     pub model: &'static str,
     /// Focal length over pixel pitch: 1 / the scale in radians per pixel at the frame's centre of a

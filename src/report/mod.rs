@@ -58,6 +58,4 @@ pub use text::STARS_SHOWN;
 pub use text::TextOptions;
 pub use track::TrackReport;
 #[doc(hidden)]
-pub use track::{
-    AxesReport, NotTrackedReport, TrackAttitudeReport, TrackOpticsReport, TrackTimingReport,
-};
+pub use track::{AxesReport, NotTrackedReport, TrackOpticsReport, TrackTimingReport};

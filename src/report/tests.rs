@@ -145,6 +145,8 @@ fn optics() -> OpticsReport {
         held: false,
         fov_x_deg: Some(20.012_345),
         fov_y_deg: Some(15.081_234),
+        fov_x_sigma_deg: Some(0.003),
+        fov_y_sigma_deg: Some(0.002),
         model: "pinhole",
         axis_px: [511.5, 383.5],
         valid_to_deg: None,
@@ -209,6 +211,7 @@ fn identified() -> FrameReport {
                 y: 2.345,
                 roll: 31.51,
             },
+            covariance_arcsec2: [[9.929, 0.5, -1.25], [0.5, 5.499, 2.0], [-1.25, 2.0, 992.9]],
         }),
         optics: Some(optics()),
         matched: Some(MatchReport {

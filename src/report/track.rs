@@ -3,8 +3,8 @@
 use super::digits::{PIXEL_DECIMALS, SIGMA_DIGITS};
 use super::frame_report::{AttitudeReport, DistortionReport, SCHEMA};
 use super::{build, reason};
-use crate::base::format::{finite, json_escaped, significant, to_decimals, to_significant};
-use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::base::format::{finite, json_escaped, significant, to_decimals};
+use crate::base::units::DEG_PER_RAD;
 use crate::camera::CameraModel;
 use crate::pipeline::Outcome;
 use crate::track::{AngularRate, Attitude, Loss, Track};
@@ -31,7 +31,7 @@ pub struct TrackReport {
     /// Why the frame was not tracked, but solved in full.
     pub not_tracked: Option<NotTrackedReport>,
     /// The attitude, from this frame alone.
-    pub attitude: Option<TrackAttitudeReport>,
+    pub attitude: Option<AttitudeReport>,
     /// Angular rate about the camera's axes, in degrees per second.
     pub rate_deg_s: Option<AxesReport>,
     /// Its standard errors.
@@ -57,16 +57,6 @@ pub struct NotTrackedReport {
     pub code: &'static str,
     /// The reason as a sentence.
     pub text: String,
-}
-
-/// An attitude with its covariance.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TrackAttitudeReport {
-    /// As in other reports.
-    #[serde(flatten)]
-    pub attitude: AttitudeReport,
-    /// Covariance of the small rotation about the camera's x, y and z axes, in square arcseconds.
-    pub covariance_arcsec2: [[f64; 3]; 3],
 }
 
 /// A number for each axis of the camera.
@@ -170,7 +160,7 @@ impl TrackReport {
     /// The report as one line for people.
     pub fn to_text(&self) -> String {
         let Self { frame, mode, .. } = self;
-        let Some(TrackAttitudeReport { attitude, .. }) = &self.attitude else {
+        let Some(attitude) = &self.attitude else {
             let reason = self.reason.as_deref().unwrap_or("no attitude");
             return format!("{frame}: {mode}: {reason}\n");
         };
@@ -222,17 +212,11 @@ fn not_tracked(loss: &Loss) -> NotTrackedReport {
     }
 }
 
-fn attitude(track: &Track, found: &Attitude, at: &'static str) -> TrackAttitudeReport {
-    let covariance = found.covariance_rad2 * (ARCSEC_PER_RAD * ARCSEC_PER_RAD);
-    let element =
-        |row: usize, column: usize| to_significant(covariance[(row, column)], SIGMA_DIGITS);
+fn attitude(track: &Track, found: &Attitude, at: &'static str) -> AttitudeReport {
     let seen = track
         .places
         .attitude(&found.icrs_to_camera, track.attitude_frame);
-    TrackAttitudeReport {
-        attitude: build::attitude(&seen, &found.covariance_rad2, (at, track.attitude_frame)),
-        covariance_arcsec2: [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column))),
-    }
+    build::attitude(&seen, &found.covariance_rad2, (at, track.attitude_frame))
 }
 
 fn optics(camera: &CameraModel, focal_sigma_px: f64) -> TrackOpticsReport {

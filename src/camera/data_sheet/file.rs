@@ -9,7 +9,8 @@ use super::response::Response;
 use super::sheet::DataSheet;
 use super::spot_image::SpotImage;
 use crate::base::files;
-use crate::camera::{KnownLens, Projection};
+use crate::base::size::Size;
+use crate::camera::{FrameSizeError, KnownLens, Projection, agreed_size};
 use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
@@ -85,6 +86,25 @@ impl CameraDescription {
         let is_lens_alone = lens.is_some() && file.table.is_empty();
         let sheet = (!is_lens_alone).then(|| file.data_sheet()).transpose()?;
         Ok(Self { sheet, lens })
+    }
+
+    /// Width and height in pixels of a frame of this camera, of which `stated` is known; `None` where
+    /// neither tells them.
+    ///
+    /// # Errors
+    /// [`FrameSizeError`] where what is stated, the data sheet and the lens contradict each other.
+    pub fn frame_size(
+        &self,
+        stated: [Option<usize>; 2],
+    ) -> Result<[Option<usize>; 2], FrameSizeError> {
+        agreed_size(stated, &self.sizes())
+    }
+
+    /// The sizes of the camera's frames, by its data sheet and by its lens.
+    pub(crate) fn sizes(&self) -> Vec<Size> {
+        let of_sheet = self.sheet.as_ref().map(DataSheet::size);
+        let of_lens = self.lens.as_deref().map(KnownLens::size);
+        of_sheet.into_iter().chain(of_lens).collect()
     }
 }
 

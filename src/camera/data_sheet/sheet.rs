@@ -3,6 +3,7 @@
 use super::imperfections::Imperfections;
 use super::response::Response;
 use super::spot_image::SpotImage;
+use crate::base::size::Size;
 use std::f64::consts::SQRT_2;
 use std::sync::Arc;
 
@@ -55,6 +56,11 @@ pub struct DataSheet {
 }
 
 impl DataSheet {
+    /// Size of the detector.
+    pub(crate) fn size(&self) -> Size {
+        Size::new(self.width_px, self.height_px)
+    }
+
     /// Area of the entrance pupil, in m².
     #[doc(alias = "A")]
     pub fn aperture_area_m2(&self) -> f64 {

@@ -3,6 +3,7 @@
 use crate::cli::input::centroid_list;
 use crate::cli::input::frames::read_frame;
 use crate::cli::input::stdin::is_stdin;
+use anyhow::Context as _;
 use starpipe::frame::{Buffers, Frame, FrameError, ImageName, PageChoice, Pages};
 use starpipe::pipeline::{
     CentroidListOptions, Context, Error, Solution, Workspace, solve_centroids, solve_guarded,
@@ -122,7 +123,8 @@ fn solve_list(
 ) -> anyhow::Result<Solved> {
     solve_guarded(path, workspace, |workspace| {
         let list = centroid_list::read(path, options)?;
-        let solution = solve_centroids(&list, context, workspace);
+        let solution = solve_centroids(&list, context, workspace)
+            .with_context(|| format!("reading {}", path.display()))?;
         Ok(Solved {
             solution,
             frame: None,

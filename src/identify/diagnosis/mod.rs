@@ -16,6 +16,7 @@
 mod cause;
 mod doubles;
 mod levels;
+mod repeats;
 mod trails;
 
 #[doc(hidden)]
@@ -23,6 +24,8 @@ pub use cause::DoubleImage;
 pub use cause::{Diagnosis, Excluded};
 #[doc(hidden)]
 pub use doubles::find_unnamed as find_double_image;
+#[doc(hidden)]
+pub use repeats::{RepeatedSky, find as find_repeated_sky};
 
 use crate::camera::focal_length_px;
 use crate::detect::Detections;

@@ -67,6 +67,7 @@ fn identified(up_deg: f64, mirrored: bool) -> Outcome {
         icrs_to_camera: Rotation::looking_at(&boresight, up_deg * RAD_PER_DEG),
         attitude_covariance_rad2: Matrix3::identity() * 1e-10,
         focal_length_sigma_px: 0.1,
+        centre_sigma_px: [0.0; 2],
         matches: vec![StarMatch {
             source: SourceIndex::new(0),
             star: StarIndex::new(0),

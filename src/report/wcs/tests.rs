@@ -100,6 +100,7 @@ fn solution(camera: CameraModel, attitude: Rotation<Icrs, Camera>) -> Solution {
         attitude_covariance_rad2: Matrix3::from_diagonal(&[1e-10, 4e-10, 9e-10].into()),
         excess_sigma_px: 0.0,
         focal_length_sigma_px: 0.1,
+        centre_sigma_px: [0.0; 2],
         matches: Vec::new(),
         rms_px: 0.1,
         log10_false_alarm: -50.0,

@@ -76,7 +76,7 @@ pub fn run(
         &table::centroids(published, &scenario),
         &context,
         &mut Workspace::new(),
-    );
+    )?;
     let mut report = ExperimentReport {
         schema: SCHEMA,
         experiment: published.number,

@@ -7,7 +7,7 @@ use crate::frame::{Frame, FrameError};
 use crate::identify::{Identification, StarMatch};
 use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
-use crate::pipeline::{Context, Solution, Source, Workspace, solve_frame};
+use crate::pipeline::{CentroidListError, Context, Solution, Source, Workspace, solve_frame};
 use crate::sky::catalog::{Catalog, StarIndex};
 use crate::study::validation::LightMap;
 use nalgebra::Vector3;
@@ -25,6 +25,9 @@ pub enum ExperimentError {
     /// Stars cannot be detected in a simulated frame.
     #[error("detecting stars in a simulated frame")]
     Detect(#[from] DetectError),
+    /// The paper's list is not of its camera.
+    #[error("reading the paper's centroids")]
+    List(#[from] CentroidListError),
 }
 
 /// Largest shift of the pointing along each axis, in pixels.

@@ -74,8 +74,8 @@ pub(super) fn centroids(published: &Published, scenario: &Scenario) -> CentroidL
     let stars = published.stars.iter();
     let listed = stars.map(|star| ListedCentroid::new(star.position(), star.vmag));
     CentroidList {
-        width: scenario.camera.width_px,
-        height: scenario.camera.height_px,
+        width: Some(scenario.camera.width_px),
+        height: Some(scenario.camera.height_px),
         photometry: Photometry::JohnsonV,
         has_brightness: true,
         centroids: listed.collect(),

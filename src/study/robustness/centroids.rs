@@ -43,8 +43,8 @@ impl SimulatedCentroids {
         centroids.sort_by(|a, b| a.v_mag.total_cmp(&b.v_mag));
         Self {
             list: CentroidList {
-                width: protocol.width_px,
-                height: protocol.height_px,
+                width: Some(protocol.width_px),
+                height: Some(protocol.height_px),
                 photometry: protocol.photometry,
                 has_brightness: true,
                 centroids: centroids
