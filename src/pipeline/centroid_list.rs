@@ -174,6 +174,31 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
     centroids.iter().map(is_kept).collect()
 }
 
+impl From<&ListedCentroid> for Source {
+    fn from(centroid: &ListedCentroid) -> Self {
+        Self {
+            position: centroid.position,
+            measured: None,
+            flux: centroid.flux,
+        }
+    }
+}
+
+/// What is known of a list whose frame has this size.
+fn priors_of(size: Size, context: &Context) -> Priors {
+    let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
+        source: ScaleSource::User,
+        ..ScalePrior::of_camera(&camera.sheet)
+    });
+    let lens = context.lens_of(size.width, size.height);
+    let lens_scale = lens.map(ScalePrior::of_lens);
+    Priors {
+        scale: context.priors.scale.or(lens_scale).or(of_camera),
+        holds_lens: lens.is_some(),
+        ..context.priors
+    }
+}
+
 /// Identifies the stars of a list of centroids. Every prior is a hard constraint.
 ///
 /// Where nobody states the size of the frame, it is as large as the centroids reach, and the errors have
@@ -220,26 +245,11 @@ pub fn solve_centroids(
 ) -> Result<Solution, CentroidListError> {
     let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
-    let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
-        source: ScaleSource::User,
-        ..ScalePrior::of_camera(&camera.sheet)
-    });
     let (list, left_out) = list.usable();
     let frame = ListFrame::of(&list, &context.camera_sizes())?;
     let [width, height] = frame.size.sides();
-    let lens = context.lens_of(width, height);
-    let lens_scale = lens.map(ScalePrior::of_lens);
-    let priors = &Priors {
-        scale: context.priors.scale.or(lens_scale).or(of_camera),
-        holds_lens: lens.is_some(),
-        ..context.priors
-    };
-    let source = |centroid: &ListedCentroid| Source {
-        position: centroid.position,
-        measured: None,
-        flux: centroid.flux,
-    };
-    let sources: Vec<Source> = list.centroids.iter().map(source).collect();
+    let priors = &priors_of(frame.size, context);
+    let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
     let catalog = context.indexed.catalog();
     let mut identify = |places| {
         let field = list.star_field_in(frame.size, places);
@@ -258,12 +268,9 @@ pub fn solve_centroids(
         through_air_or_not(places, &mut identify)
     });
     let priors = &priors;
-    let second_images = if context.attitude_only {
-        SecondImages::default()
-    } else {
-        let field = list.star_field_in(frame.size, priors.places());
-        SecondImages::of(&mut outcome, &field)
-    };
+    let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
+        list.star_field_in(frame.size, priors.places())
+    });
     frame.add_unknown_centre(&list, &mut outcome);
     let observation = observation(&outcome, priors);
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);

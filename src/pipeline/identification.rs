@@ -118,10 +118,20 @@ pub(super) struct SecondImages {
 impl SecondImages {
     /// Those of a frame with these stars. Where every star is there twice, the attitude is that of one of
     /// the images, or lies between them, and its error gets half of the way from one to the other.
-    pub fn of(outcome: &mut Outcome, field: &StarField) -> Self {
+    ///
+    /// They are not looked for where attitude and optics alone are wanted.
+    pub fn of(
+        outcome: &mut Outcome,
+        attitude_only: bool,
+        field: impl FnOnce() -> StarField,
+    ) -> Self {
         let Outcome::Identified(found) = outcome else {
             return Self::default();
         };
+        if attitude_only {
+            return Self::default();
+        }
+        let field = &field();
         let named: HashSet<SourceIndex> = found.matches.iter().map(|m| m.source).collect();
         let is_named = |star: &ObservedStar| named.contains(&star.source);
         let double = find_double_image(field, is_named);

@@ -232,11 +232,9 @@ fn solve(
     } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
-    let second_images = if context.attitude_only {
-        SecondImages::default()
-    } else {
-        SecondImages::of(&mut outcome, &star_field(frame, &detections, places))
-    };
+    let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
+        star_field(frame, &detections, places)
+    });
     clock.lap(Stage::Identify);
 
     let mut solved = SolvedFrame {
