@@ -5,7 +5,7 @@ use crate::base::statistics::median;
 use crate::camera::KnownLens;
 use crate::identify::Identification;
 use crate::lens::{LensFrame, calibrate};
-use crate::photometry::sky_map::{ClearSky, DarkLevel};
+use crate::photometry::sky_map::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
 use crate::sky::observer::Site;
 use std::sync::Arc;
@@ -26,6 +26,7 @@ pub struct Probe {
     sigma_rad: f64,
     spot_sigma_px: Option<f64>,
     clear_sky: Option<ClearSky>,
+    curves: Option<CurveEvidence>,
     has_dark_level: bool,
     site: Option<Site>,
 }
@@ -45,7 +46,14 @@ impl Probe {
             sigma_rad: found.attitude_sigma_rad().into_iter().fold(0.0, f64::max),
             spot_sigma_px: solution.spot_sigma_px,
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
-            has_dark_level: solution.sky.as_ref().is_none_or(|sky| sky.dark.is_some()),
+            curves: solution
+                .sky
+                .as_ref()
+                .and_then(|sky| sky.curve_evidence.clone()),
+            has_dark_level: solution.sky.as_ref().is_none_or(|sky| {
+                let source = sky.dark.map(|dark| dark.source);
+                source.is_some_and(|source| source != DarkSource::Darkest)
+            }),
             site: solution.site,
         })
     }
@@ -87,6 +95,8 @@ impl NightStart {
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let lacks_dark_level = probes.iter().any(|probe| !probe.has_dark_level);
+        let curves = probes.iter().filter_map(|probe| probe.curves.clone());
+        let curves = CurveEvidence::of_frames(&curves.collect::<Vec<_>>());
         let site = probes.iter().find_map(|probe| probe.site);
         let lens = known.or_else(|| measured_lens(probes));
         let held = first
@@ -98,6 +108,7 @@ impl NightStart {
                 spot_sigma_px,
                 clear_sky,
                 dark: None,
+                curves,
             });
         Self {
             lens,
