@@ -5,7 +5,7 @@ use crate::base::statistics::median;
 use crate::camera::KnownLens;
 use crate::identify::{DateZone, Identification};
 use crate::lens::{LensFrame, calibrate};
-use crate::photometry::sky_map::{ClearSky, DarkLevel};
+use crate::photometry::sky_map::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
 use crate::sky::observer::Site;
 use jiff::SignedDuration;
@@ -28,6 +28,7 @@ pub struct Probe {
     spot_sigma_px: Option<f64>,
     clear_sky: Option<ClearSky>,
     has_exposure: bool,
+    curves: Option<CurveEvidence>,
     has_dark_level: bool,
     site: Option<Site>,
     /// What its local time is ahead of UTC, by the stars.
@@ -52,7 +53,14 @@ impl Probe {
             spot_sigma_px: solution.spot_sigma_px,
             clear_sky: solution.sky.as_ref().map(|sky| sky.clear_sky),
             has_exposure: solution.exposure_s.is_some(),
-            has_dark_level: solution.sky.as_ref().is_none_or(|sky| sky.dark.is_some()),
+            curves: solution
+                .sky
+                .as_ref()
+                .and_then(|sky| sky.curve_evidence.clone()),
+            has_dark_level: solution.sky.as_ref().is_none_or(|sky| {
+                let source = sky.dark.map(|dark| dark.source);
+                source.is_some_and(|source| source != DarkSource::Darkest)
+            }),
             site: solution.site,
             ahead: match solution.date.map(|known| known.zone) {
                 Some(DateZone::ByStars(ahead)) => Some(ahead),
@@ -107,6 +115,8 @@ impl NightStart {
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
         let lacks_dark_level = probes.iter().any(|probe| !probe.has_dark_level);
+        let curves = probes.iter().filter_map(|probe| probe.curves.clone());
+        let curves = CurveEvidence::of_frames(&curves.collect::<Vec<_>>());
         let site = probes.iter().find_map(|probe| probe.site);
         let ahead = agreed(probes.iter().filter_map(|probe| probe.ahead));
         let wrong = probes.iter().filter_map(|probe| probe.site_or_time.clone());
@@ -123,6 +133,7 @@ impl NightStart {
                 spot_sigma_px,
                 clear_sky,
                 dark: None,
+                curves,
             });
         Self {
             lens,

@@ -8,7 +8,7 @@ use crate::detect::Detections;
 use crate::identify::{
     Identification, IndexedCatalog, Priors, SkyRegion, SkyView, SourceIndex, StarMatch,
 };
-use crate::photometry::sky_map::{ClearSky, DarkLevel};
+use crate::photometry::sky_map::{ClearSky, CurveEvidence, DarkLevel};
 use crate::sky::places::StarPlaces;
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
@@ -28,6 +28,8 @@ pub struct HeldCamera {
     pub clear_sky: Option<ClearSky>,
     /// The level of a pixel without light, for frames that do not tell it.
     pub dark: Option<DarkLevel>,
+    /// What its frames tell of its tone curve.
+    pub curves: Option<CurveEvidence>,
 }
 
 /// How far from where it is held the boresight is searched for first.

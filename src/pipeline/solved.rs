@@ -102,6 +102,7 @@ impl SolvedFrame<'_> {
             colors,
             dark: by_dark.or(by_camera).or(by_frame),
             usual_dark: usual.and_then(|usual| usual.dark).filter(|_| !has_flat),
+            usual_curves: usual.and_then(|usual| usual.curves.as_ref()),
             is_flat: has_flat || camera.is_some(),
             moon: self.priors.date.map(|known| {
                 let (moon, _) = moon_and_sun(&known.date, self.priors.site);

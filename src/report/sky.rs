@@ -3,13 +3,15 @@
 use super::digits::{HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS, SHARE_DECIMALS};
 use crate::base::format::{significant, to_decimals};
 use crate::base::statistics::Estimate;
-use crate::photometry::sky_map::{Place, SkyCell, SkyMap, ZenithSky};
+use crate::photometry::sky_map::{Place, SkyCell, SkyMap, ToneFit, ZenithSky};
 use serde::Serialize;
 
 /// Significant digits of solid angles, luminances and probabilities.
 const DIGITS: i32 = 4;
 /// Decimals of levels.
 const ADU_DECIMALS: i32 = 3;
+/// Decimals of the exponent of a tone curve.
+const EXPONENT_DECIMALS: i32 = 3;
 
 /// The sky at each place of a frame. Magnitudes are those of V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,8 +39,11 @@ pub struct SkyReport {
     /// Its standard error.
     pub dark_level_sigma_adu: Option<f64>,
     /// What tells it: `dark`, `camera`, `optical_black`, `unlit` (the pixels outside the circle of an all-sky
-    /// lens), or `exposures` (other frames of the night).
+    /// lens), `exposures` (other frames of the night), or `darkest` (it is between 0 and the darkest part of the
+    /// frame).
     pub dark_level_source: Option<&'static str>,
+    /// The tone curve by which levels became light; `null` where they are taken to be proportional to it.
+    pub tone_curve: Option<ToneCurveReport>,
     /// Why no brightness was measured: `bias_unknown` or `not_linear`.
     pub no_brightness: Option<&'static str>,
     /// The brightness at the zenith, as a meter with a field of 20° sees it.
@@ -51,6 +56,21 @@ pub struct SkyReport {
     pub cells: Vec<SkyCellReport>,
     #[serde(skip)]
     pub(super) no_brightness_text: Option<&'static str>,
+}
+
+/// A tone curve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ToneCurveReport {
+    /// The likeliest kind: `linear`, `power`, `srgb`, `midtones` or `asinh`.
+    pub kind: &'static str,
+    /// Its probability.
+    pub probability: f64,
+    /// Relative growth of the sky's level over that of its light, both above those without light; 1 where levels
+    /// are proportional to light.
+    pub exponent: f64,
+    /// Its standard error.
+    pub exponent_sigma: f64,
 }
 
 /// The brightness at the zenith.
@@ -143,12 +163,24 @@ impl SkyReport {
                 .dark
                 .map(|dark| to_decimals(dark.adu.sigma, ADU_DECIMALS)),
             dark_level_source: sky.dark.map(|dark| dark.source.code()),
+            tone_curve: sky.tone_curve.as_ref().map(ToneCurveReport::new),
             no_brightness: sky.no_brightness.map(|why| why.code()),
             no_brightness_text: sky.no_brightness.map(|why| why.text()),
             zenith: sky.zenith.as_ref().map(ZenithReport::new),
             cloud_share: share(|share| share.value),
             cloud_share_sigma: share(|share| share.sigma),
             cells: sky.cells.iter().map(SkyCellReport::new).collect(),
+        }
+    }
+}
+
+impl ToneCurveReport {
+    fn new(tone: &ToneFit) -> Self {
+        Self {
+            kind: tone.kind.code(),
+            probability: to_decimals(tone.probability, SHARE_DECIMALS),
+            exponent: to_decimals(tone.exponent.value, EXPONENT_DECIMALS),
+            exponent_sigma: to_decimals(tone.exponent.sigma, EXPONENT_DECIMALS),
         }
     }
 }

@@ -41,6 +41,17 @@ impl SkyReport {
             let text = format!("{level:.1} ± {sigma:.1} ADU, by pixels outside the lens's circle");
             lines.push(labelled("no light", &text));
         }
+        if self.dark_level_source == Some("darkest") {
+            let text = "its level is not known, but no higher than the darkest part of the frame";
+            lines.push(labelled("no light", text));
+        }
+        if let Some(tone) = &self.tone_curve {
+            let text = format!(
+                "levels go as light to the power {:.2} ± {:.2} by stars; the brightness contains this error",
+                tone.exponent, tone.exponent_sigma
+            );
+            lines.push(labelled("tone curve", &text));
+        }
         if let Some(why) = self.no_brightness_text {
             lines.push(labelled("sky", &format!("no brightness: {why}")));
         }

@@ -341,3 +341,36 @@ fn a_color_camera_sees_the_same_sky_and_its_color() {
     let difference = mean(limits);
     assert!(difference.abs() < 0.15, "{difference}");
 }
+
+/// A picture of that sky as color cameras make it, with a tone curve.
+fn picture(directory: &Path, gamma: f64) -> PathBuf {
+    let camera = described(directory);
+    let frame = simulated(directory, &camera, &[]);
+    let raw = starpipe::frame::read(&frame).unwrap();
+    let values = raw.values();
+    let lit = |value: &f32| ((f64::from(*value) - 8.0) / 1200.0).clamp(0.0, 1.0);
+    let level = |value: &f32| (255.0 * lit(value).powf(1.0 / gamma)).round() as u8;
+    let levels: Vec<u8> = values.iter().map(level).collect();
+    let file = directory.join("picture.jpg");
+    let mut bytes = Vec::new();
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 92)
+        .encode(&levels, SIDE, SIDE, image::ExtendedColorType::L8)
+        .unwrap();
+    fs::write(&file, bytes).unwrap();
+    file
+}
+
+#[test]
+fn a_jpeg_with_a_tone_curve_has_a_brightness_with_its_error() {
+    for gamma in [1.6, 2.2] {
+        let directory = tempfile::tempdir().unwrap();
+        let file = picture(directory.path(), gamma);
+        let found = sky(&file, &["--exposure=20".to_owned()]);
+        assert!(found["no_brightness"].is_null(), "{found}");
+        let mag = number(&found, "/zenith/mag_arcsec2");
+        let sigma = number(&found, "/zenith/sigma_mag");
+        let off = (mag - SKY_MAG).abs();
+        assert!(sigma < 0.4 && off < 2.0 * sigma, "{gamma}: {mag} ± {sigma}");
+        assert!(number(&found, "/tone_curve/exponent") < 0.9);
+    }
+}

@@ -7,7 +7,7 @@ use super::dark_level::DarkLevel;
 use super::grid::Grid;
 use super::picture::Picture;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
-use crate::base::statistics::Estimate;
+use crate::base::statistics::{Estimate, median};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::{BackgroundMap, least_cell_px};
 use crate::model::sensitivity::SkyBrightness;
@@ -121,6 +121,27 @@ pub(super) struct Levels {
     zenith: Sum,
     /// Solid angle about the zenith in the frame, weighted in the same way.
     zenith_sr: f64,
+    /// Where it was measured.
+    places: Vec<LitPlace>,
+}
+
+/// A place at which light is measured.
+struct LitPlace {
+    cell: usize,
+    /// How a meter at the zenith weighs it.
+    zenith_weight: f64,
+    /// Level of the sky, in ADU.
+    level_adu: f64,
+    /// Distance from the frame's centre over that of the edge of the field, squared.
+    off_centre_sq: f64,
+    /// Solid angle of a pixel, in steradians, times the part of its light that the lens is known to let through.
+    pixel_sr: f64,
+}
+
+/// Light of cells and about the zenith, in other units than levels.
+pub(super) struct OtherLight {
+    cells: Vec<Sum>,
+    zenith: Sum,
 }
 
 /// What the sums of a cell need.
@@ -156,6 +177,7 @@ impl Levels {
             color_index: colors.as_ref().map(|colors| colors.index),
             zenith: Sum::default(),
             zenith_sr: 0.0,
+            places: Vec::new(),
         };
         let mut sums = vec![CellSums::default(); grid.places.len()];
         let is_by_moon = |direction: &UnitVector<Icrs>| {
@@ -182,15 +204,19 @@ impl Levels {
                     continue;
                 };
                 let airmass = frame.places.airmass(&direction);
-                let off_centre_sq = camera.off_centre_sq(&pixel) / edge_sq;
+                let weight = frame.places.zenith().map_or(0.0, |zenith| {
+                    meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD)
+                });
+                let place = LitPlace {
+                    cell,
+                    zenith_weight: if is_by_moon(&direction) { 0.0 } else { weight },
+                    level_adu: f64::from(background_row[x]),
+                    off_centre_sq: camera.off_centre_sq(&pixel) / edge_sq,
+                    pixel_sr: pixel_sr * frame.lens_transmission(&pixel),
+                };
                 let sample = Sum {
-                    samples: 1.0,
-                    off_centre_sq,
-                    light_adu: picture.flux_scale * (f64::from(background_row[x]) - dark_adu),
                     filters_adu: colors.as_ref().map_or([0.0; 2], |colors| colors.at(x)),
-                    solid_angle_sr: pixel_sr
-                        * clear_sky.transmission(off_centre_sq)
-                        * frame.lens_transmission(&pixel),
+                    ..place.sample(picture.flux_scale * (place.level_adu - dark_adu), clear_sky)
                 };
                 let level = &mut levels.cells[cell];
                 level.solid_angle_sr += pixel_sr * (step * step) as f64;
@@ -198,13 +224,11 @@ impl Levels {
                 let sum = &mut sums[cell];
                 sum.airmass += airmass.unwrap_or(f64::NAN);
                 sum.limit_adu += frame.flux_limit_adu(&pixel).unwrap_or(f64::NAN);
-                let weight = frame.places.zenith().map_or(0.0, |zenith| {
-                    meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD)
-                });
-                if weight > 0.0 && !is_by_moon(&direction) {
-                    levels.zenith.add(weight, &sample);
-                    levels.zenith_sr += weight * pixel_sr * (step * step) as f64;
+                if place.zenith_weight > 0.0 {
+                    levels.zenith.add(place.zenith_weight, &sample);
+                    levels.zenith_sr += place.zenith_weight * pixel_sr * (step * step) as f64;
                 }
+                levels.places.push(place);
             }
         }
         for (level, sum) in levels.cells.iter_mut().zip(sums) {
@@ -229,26 +253,59 @@ impl Levels {
 
     /// The brightness of a cell; `None` where it has no light.
     pub(super) fn light(&self, cell: usize, clear_sky: &ClearSky) -> Option<SkyLight> {
-        self.brightness(&self.cells[cell].light, clear_sky)
+        self.brightness(&self.cells[cell].light, clear_sky, self.dark_sigma_adu)
     }
 
     /// The brightness about the zenith; `None` where too little of it is in the frame.
     pub(super) fn zenith(&self, clear_sky: &ClearSky) -> Option<ZenithSky> {
-        /// Share of what a meter would see that is in the frame at least.
-        const LEAST_SHARE: f64 = 0.9;
-        if self.zenith_sr < LEAST_SHARE * meter_solid_angle_sr() {
-            return None;
-        }
-        let light = self.brightness(&self.zenith, clear_sky)?;
-        let mag = light.mag_arcsec2.value;
-        Some(ZenithSky {
-            light,
-            naked_eye_limit_vmag: naked_eye_limit_vmag(mag),
-            bortle: bortle(mag),
-        })
+        let light = self.brightness(&self.zenith, clear_sky, self.dark_sigma_adu);
+        light.filter(|_| self.shows_zenith()).map(ZenithSky::of)
     }
 
-    fn brightness(&self, light: &Sum, clear_sky: &ClearSky) -> Option<SkyLight> {
+    /// Whether what a meter would see about the zenith is in the frame.
+    pub(super) fn shows_zenith(&self) -> bool {
+        /// The share of it that is at least.
+        const LEAST_SHARE: f64 = 0.9;
+        self.zenith_sr >= LEAST_SHARE * meter_solid_angle_sr()
+    }
+
+    /// The median level of the sky, in ADU.
+    pub(super) fn median_adu(&self) -> Option<f64> {
+        let mut levels: Vec<f64> = self.places.iter().map(|place| place.level_adu).collect();
+        (!levels.is_empty()).then(|| median(&mut levels))
+    }
+
+    /// The light in other units, of which `light` tells that of a level.
+    pub(super) fn in_units(&self, light: impl Fn(f64) -> f64, clear_sky: &ClearSky) -> OtherLight {
+        let mut found = OtherLight {
+            cells: vec![Sum::default(); self.cells.len()],
+            zenith: Sum::default(),
+        };
+        for place in &self.places {
+            let sample = place.sample(light(place.level_adu), clear_sky);
+            found.cells[place.cell].add(1.0, &sample);
+            found.zenith.add(place.zenith_weight, &sample);
+        }
+        found
+    }
+
+    /// The brightness of each cell, and that about the zenith, in light of other units.
+    pub(super) fn brightness_of(
+        &self,
+        light: &OtherLight,
+        clear_sky: &ClearSky,
+    ) -> (Vec<Option<SkyLight>>, Option<SkyLight>) {
+        let of = |sum: &Sum| self.brightness(sum, clear_sky, 0.0);
+        let zenith = Some(&light.zenith).filter(|_| self.shows_zenith());
+        (light.cells.iter().map(of).collect(), zenith.and_then(of))
+    }
+
+    fn brightness(
+        &self,
+        light: &Sum,
+        clear_sky: &ClearSky,
+        dark_sigma_adu: f64,
+    ) -> Option<SkyLight> {
         let square_arcsec = light.solid_angle_sr / RAD_PER_ARCSEC.powi(2);
         let flux_adu_s = light.light_adu / square_arcsec / self.exposure_s;
         if flux_adu_s.is_nan() || flux_adu_s <= 0.0 {
@@ -261,7 +318,7 @@ impl Levels {
             light.mean_off_centre_sq(),
         );
         let mag = zero_point.value + instrumental_mag(flux_adu_s);
-        let by_dark = light.samples * self.dark_sigma_adu / light.light_adu;
+        let by_dark = light.samples * dark_sigma_adu / light.light_adu;
         Some(SkyLight {
             mag_arcsec2: Estimate {
                 value: mag,
@@ -270,6 +327,31 @@ impl Levels {
             bv_mag,
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag).luminance_cd_m2(),
         })
+    }
+}
+
+impl LitPlace {
+    /// With this light, and what a clear sky's lens lets through.
+    fn sample(&self, light_adu: f64, clear_sky: &ClearSky) -> Sum {
+        Sum {
+            samples: 1.0,
+            off_centre_sq: self.off_centre_sq,
+            light_adu,
+            filters_adu: [0.0; 2],
+            solid_angle_sr: self.pixel_sr * clear_sky.transmission(self.off_centre_sq),
+        }
+    }
+}
+
+impl ZenithSky {
+    /// What follows from its brightness.
+    pub(super) fn of(light: SkyLight) -> Self {
+        let mag = light.mag_arcsec2.value;
+        Self {
+            light,
+            naked_eye_limit_vmag: naked_eye_limit_vmag(mag),
+            bortle: bortle(mag),
+        }
     }
 }
 
@@ -293,17 +375,6 @@ impl Sum {
         for (sum, light_adu) in self.filters_adu.iter_mut().zip(sample.filters_adu) {
             *sum += weight * light_adu;
         }
-    }
-}
-
-/// Why the brightness of a frame cannot be measured.
-pub(super) fn refusal(dark: Option<&DarkLevel>, clear_sky: &ClearSky) -> Option<NoBrightness> {
-    if clear_sky.has_tone_curve() {
-        Some(NoBrightness::NotLinear)
-    } else if dark.is_none() {
-        Some(NoBrightness::BiasUnknown)
-    } else {
-        None
     }
 }
 

@@ -29,6 +29,8 @@ pub enum DarkSource {
     Unlit,
     /// Frames of different exposure.
     Exposures,
+    /// The darkest part of the frame: it is no higher.
+    Darkest,
 }
 
 impl DarkSource {
@@ -40,6 +42,7 @@ impl DarkSource {
             Self::OpticalBlack => "optical_black",
             Self::Unlit => "unlit",
             Self::Exposures => "exposures",
+            Self::Darkest => "darkest",
         }
     }
 }
@@ -61,13 +64,27 @@ impl DarkLevel {
     }
 }
 
+/// Light that an all-sky lens scatters outside its circle, over that of the sky, and its error.
+pub(super) const STRAY_LIGHT: Estimate = Estimate {
+    value: 0.02,
+    sigma: 0.02,
+};
+
 /// That of the pixels outside the circle of an all-sky lens, where they are those of the detector.
 fn of_unlit(frame: &Frame, circle: &Circle, sky_adu: f64) -> Option<DarkLevel> {
-    /// Light that the lens scatters there, over that of the sky, and its error.
-    const STRAY_LIGHT: Estimate = Estimate {
-        value: 0.02,
-        sigma: 0.02,
-    };
+    let unlit_adu = unlit_adu(frame, circle)?;
+    let over_adu = (sky_adu - unlit_adu.value).max(0.0);
+    Some(DarkLevel {
+        adu: Estimate {
+            value: unlit_adu.value - STRAY_LIGHT.value * over_adu,
+            sigma: libm::hypot(unlit_adu.sigma, STRAY_LIGHT.sigma * over_adu),
+        },
+        source: DarkSource::Unlit,
+    })
+}
+
+/// The level of the pixels outside the circle, with the light that the lens scatters there.
+pub(super) fn unlit_adu(frame: &Frame, circle: &Circle) -> Option<Estimate> {
     /// Corners at least, of four.
     const MIN_CORNERS: usize = 3;
     let level = |pixels| level_of(pixels, frame.step_adu.into());
@@ -84,14 +101,9 @@ fn of_unlit(frame: &Frame, circle: &Circle, sky_adu: f64) -> Option<DarkLevel> {
         .sum::<f64>()
         / (count - 1.0);
     // A corner in which something shines does not count.
-    let unlit_adu = median(&mut levels);
-    let over_adu = (sky_adu - unlit_adu).max(0.0);
-    Some(DarkLevel {
-        adu: Estimate {
-            value: unlit_adu - STRAY_LIGHT.value * over_adu,
-            sigma: libm::hypot((variance / count).sqrt(), STRAY_LIGHT.sigma * over_adu),
-        },
-        source: DarkSource::Unlit,
+    Some(Estimate {
+        value: median(&mut levels),
+        sigma: (variance / count).sqrt(),
     })
 }
 
@@ -120,17 +132,19 @@ fn corners(frame: &Frame, circle: &Circle) -> [Vec<f64>; 4] {
     corners
 }
 
-/// The level of a corner. `None` for few pixels, and where nearly all are the same,
-/// as where a program drew a mask.
+/// The level of a corner. `None` for few pixels, and where nearly all are black, as where a program drew a mask.
 fn level_of(mut pixels: Vec<f64>, step_adu: f64) -> Option<f64> {
     const MIN_PIXELS: usize = 100;
     const MAX_SAME: f64 = 0.95;
+    /// Steps up to which a level may be that of a drawn mask, which compression changes.
+    const DRAWN_STEPS: f64 = 2.0;
     if pixels.len() < MIN_PIXELS {
         return None;
     }
     let middle = median(&mut pixels);
     let same = pixels.iter().filter(|pixel| **pixel == middle).count();
-    if same as f64 > MAX_SAME * pixels.len() as f64 {
+    let is_even = same as f64 > MAX_SAME * pixels.len() as f64;
+    if is_even && middle <= DRAWN_STEPS * step_adu {
         return None;
     }
     Some(median_of_rounded(&mut pixels, step_adu))

@@ -31,6 +31,7 @@ mod limits;
 mod picture;
 mod relative_limit;
 mod stars;
+mod tone_curve;
 mod witnesses;
 
 #[doc(hidden)]
@@ -46,6 +47,9 @@ pub use grid::{horizon_places, is_wide};
 pub use limits::StatedLimit;
 #[doc(hidden)]
 pub use picture::Picture;
+#[doc(hidden)]
+pub use tone_curve::CurveEvidence;
+pub use tone_curve::{CurveKind, ToneFit};
 
 use super::IdentifiedFrame;
 use super::association::associate;
@@ -53,6 +57,7 @@ use crate::base::statistics::Estimate;
 use crate::identify::{IndexedCatalog, SkyView};
 use brightness::Levels;
 use grid::Grid;
+use tone_curve::{Curved, CurvedFrame};
 use witnesses::Sky;
 
 /// The sky over a frame.
@@ -65,6 +70,11 @@ pub struct SkyMap {
     pub clear_sky: ClearSky,
     /// The level of a pixel without light, where it is known.
     pub dark: Option<DarkLevel>,
+    /// The tone curve, where gray levels may have one.
+    pub tone_curve: Option<ToneFit>,
+    /// What stars tell of it.
+    #[doc(hidden)]
+    pub curve_evidence: Option<CurveEvidence>,
     /// Why no brightness was measured.
     pub no_brightness: Option<NoBrightness>,
     /// The brightness at the zenith, where it is in the frame.
@@ -126,12 +136,30 @@ pub fn measure(
         false => DarkLevel::of_unlit_pixels(picture.frame, frame.detections),
     };
     let dark = picture.dark.or_else(unlit).or(picture.usual_dark);
-    let no_brightness = brightness::refusal(dark.as_ref(), &clear_sky);
-    let color = match no_brightness {
-        None => color::SkyColors::of(frame, picture, dark.as_ref(), &stars),
-        Some(_) => None,
-    };
+    let is_proportional = is_proportional(picture, &clear_sky, usual.is_some());
+    let color = dark
+        .filter(|_| is_proportional)
+        .and_then(|dark| color::SkyColors::of(frame, picture, Some(&dark), &stars));
     let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
+    let measured = CurvedFrame {
+        frame,
+        picture,
+        stars: &stars,
+        clear_sky: &clear_sky,
+        levels: &levels,
+    };
+    let curved = match (is_proportional, dark) {
+        (true, Some(dark)) => Some(Curved::of_levels(&levels, &clear_sky, dark)),
+        (true, None) => measured.with_unknown_dark_level(),
+        // Nothing tells the curve where the clear sky is that of another frame.
+        (false, _) if usual.is_some() => None,
+        (false, _) => measured.with_unknown_curve(),
+    };
+    let no_brightness = match dark {
+        None if !clear_sky.has_tone_curve() => NoBrightness::BiasUnknown,
+        _ => NoBrightness::NotLinear,
+    };
+    let no_brightness = Some(no_brightness).filter(|_| curved.is_none());
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
         grid: &grid,
@@ -150,10 +178,7 @@ pub fn measure(
         share,
     } = sky.clouds(&witnesses, &levels);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
-    let light = |cell: usize| match no_brightness {
-        None => levels.light(cell, &clear_sky),
-        Some(_) => None,
-    };
+    let light = |cell: usize| curved.as_ref().and_then(|curved| curved.cells[cell]);
     let cells = grid.places.iter().enumerate().map(|(cell, place)| SkyCell {
         place: *place,
         solid_angle_sr: levels.cells[cell].solid_angle_sr,
@@ -168,13 +193,19 @@ pub fn measure(
     let cells: Vec<SkyCell> = cells.filter(|cell| cell.solid_angle_sr > 0.0).collect();
     Some(SkyMap {
         cloud_share: share,
-        zenith: no_brightness
-            .is_none()
-            .then(|| levels.zenith(&clear_sky))
-            .flatten(),
-        dark,
+        zenith: curved.as_ref().and_then(|curved| curved.zenith),
+        dark: curved.as_ref().map(|curved| curved.dark),
+        tone_curve: curved.as_ref().and_then(|curved| curved.tone),
+        curve_evidence: curved.and_then(|curved| curved.evidence),
         no_brightness,
         clear_sky,
         cells,
     })
+}
+
+/// Whether gray levels are taken to be proportional to light: stars show no tone curve, and the file has more than
+/// the eight bits of most that have one, or a level without light is stated for it.
+fn is_proportional(picture: &Picture, clear_sky: &ClearSky, is_usual: bool) -> bool {
+    let is_raw = picture.dark.is_some() || !picture.has_eight_bits();
+    !clear_sky.has_tone_curve() && (is_raw || is_usual)
 }

@@ -1,6 +1,7 @@
 //! The pixels in which the sky is measured.
 
 use super::dark_level::DarkLevel;
+use super::tone_curve::CurveEvidence;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::frame::Frame;
 use crate::photometry::PictureColors;
@@ -18,8 +19,17 @@ pub struct Picture<'a, 'p> {
     pub dark: Option<DarkLevel>,
     /// The same by other frames, where this one does not tell it.
     pub usual_dark: Option<DarkLevel>,
+    /// What other frames tell of its tone curve.
+    pub usual_curves: Option<&'a CurveEvidence>,
     /// Whether the loss of light towards the corners is known, and was removed or is stated.
     pub is_flat: bool,
     /// Where the Moon is, where the date is known.
     pub moon: Option<UnitVector<Icrs>>,
+}
+
+impl Picture<'_, '_> {
+    /// Whether it has eight bits: most files of so few have a tone curve.
+    pub(super) fn has_eight_bits(&self) -> bool {
+        self.frame.saturation_adu == Some(f32::from(u8::MAX))
+    }
 }

@@ -24,6 +24,8 @@ pub(super) struct SkyStar {
     pub brighter_mag: f64,
     /// Whether it was detected.
     pub is_detected: bool,
+    /// Where it was detected.
+    pub seen_at: Option<PixelPoint>,
     /// Its brightness in the frame, where that is clean.
     pub measured: Option<Measured>,
 }
@@ -62,6 +64,7 @@ pub(super) fn of(
                 off_centre_sq: off_centre_sq / edge_sq,
                 brighter_mag: star.brighter_mag(),
                 is_detected: detection.is_some(),
+                seen_at: detection.map(|detection| detection.position),
                 measured,
             }
         })

@@ -36,6 +36,11 @@ impl ClearFit {
         LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)
     }
 
+    /// The fit to all of them.
+    pub fn to_all(candidates: &[Candidate], is_flat: bool) -> Option<Self> {
+        Self::to_brighter(candidates, f64::INFINITY, is_flat)
+    }
+
     /// The fit to those that have at most this expected error.
     ///
     /// Clear stars and those behind clouds are told apart by expectation and maximization, from several
@@ -97,7 +102,7 @@ impl ClearFit {
     }
 
     /// Logarithm of the likelihood of `stars` and of the unknowns by experience.
-    fn ln_posterior(&self, stars: &[&Candidate], is_flat: bool) -> f64 {
+    pub fn ln_posterior(&self, stars: &[&Candidate], is_flat: bool) -> f64 {
         let of_star = |star: &&Candidate| {
             let kind = star.kind(&self.fit.unknowns, &self.errors, &self.clouds);
             kind.ln_likelihood

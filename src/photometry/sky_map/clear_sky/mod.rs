@@ -75,6 +75,27 @@ impl ClearSky {
         Some(Self::by(&fitted, has_horizon, mean_vmag))
     }
 
+    /// The same by `stars` whose magnitudes are those of light, all of which count, and the logarithm of its
+    /// likelihood.
+    pub(super) fn of_light(stars: &[SkyStar], is_flat: bool) -> Option<(Self, f64)> {
+        let mut candidates = Candidate::all_of(stars, 0.0);
+        for candidate in &mut candidates {
+            candidate.row[SLOPE] = 0.0;
+        }
+        let has_horizon = stars.iter().any(|star| star.airmass.is_some());
+        let fitted = ClearFit::to_all(&candidates, is_flat)?;
+        let all: Vec<&Candidate> = candidates.iter().collect();
+        let clear_sky = Self::by(&fitted, has_horizon, 0.0);
+        Some((clear_sky, fitted.ln_posterior(&all, is_flat)))
+    }
+
+    /// Error that a star's magnitude would have by its flux, if it were as bright as it should be.
+    pub(super) fn expected_sigma_mag(&self, star: &SkyStar) -> Option<f64> {
+        let measured = star.measured?;
+        let dimmer_mag = measured.instrumental_mag - self.instrumental_mag(star);
+        Some(measured.sigma_mag * libm::pow(10.0, -0.4 * dimmer_mag))
+    }
+
     fn by(fitted: &ClearFit, has_horizon: bool, mean_vmag: f64) -> Self {
         /// Part of what experience leaves open that a measured extinction leaves.
         const MEASURED: f64 = 0.5;

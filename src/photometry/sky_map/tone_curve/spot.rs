@@ -1,0 +1,137 @@
+//! The light of a star, by each tone curve that a picture may have.
+
+use super::curve::ToneCurve;
+use crate::base::statistics::{SIGMA_PER_MAD, median};
+use crate::detect::Detections;
+use crate::frame::Frame;
+use crate::photometry::sky_map::stars::SkyStar;
+use crate::photometry::{MAG_PER_RELATIVE, Measured, instrumental_mag};
+
+/// The pixels of a star and of the sky around it.
+pub(super) struct Spot {
+    star: SkyStar,
+    /// Levels of its pixels, and of those of the sky, in ADU.
+    levels_adu: Vec<f64>,
+    around_adu: Vec<f64>,
+    /// Fluxes over light: what neighbors add, what the lens takes, and the exposure.
+    flux_per_light: f64,
+}
+
+/// A star by a tone curve.
+pub(super) struct LitSpot {
+    /// The star with the magnitude of its light.
+    pub star: SkyStar,
+    /// Relative change of its flux in levels over that of its light, logarithm.
+    pub ln_response: f64,
+}
+
+/// Within which distance of a star its light is summed, in pixels.
+pub(super) fn reach_px(detections: &Detections) -> f64 {
+    const SIGMAS: f64 = 3.0;
+    const PIXEL: f64 = 1.0;
+    let widest_px = detections.psf.map_or(0.0, |psf| psf.sigma_range_px[1]);
+    let trail_px = detections.trails.map_or(0.0, |trails| trails.length_px);
+    SIGMAS * detections.spot_sigma_px.max(widest_px) + PIXEL + 0.5 * trail_px
+}
+
+impl Spot {
+    /// The pixels of `star`. `None` at the border, and where they come near to white.
+    pub fn of(
+        frame: &Frame,
+        star: &SkyStar,
+        reach_px: f64,
+        white_adu: f64,
+        flux_per_light: f64,
+    ) -> Option<Self> {
+        /// Part of white at which colors of a pixel may be cut off.
+        const BRIGHTEST: f64 = 0.9;
+        /// The sky around it, from and to, in pixels beyond its reach.
+        const AROUND_PX: [f64; 2] = [1.0, 4.0];
+        let centre = star.seen_at?;
+        let side = (reach_px + AROUND_PX[1]).ceil() as usize;
+        let range = |at: f64, end: usize| {
+            let first = (at.round().max(0.0) as usize).checked_sub(side)?;
+            let last = first + 2 * side;
+            (last < end).then_some(first..=last)
+        };
+        let (columns, rows) = (
+            range(centre.x, frame.width)?,
+            range(centre.y, frame.height)?,
+        );
+        let (mut levels_adu, mut around_adu) = (Vec::new(), Vec::new());
+        for y in rows {
+            for x in columns.clone() {
+                let level_adu = f64::from(frame.at(x, y));
+                let distance_px = libm::hypot(x as f64 - centre.x, y as f64 - centre.y);
+                if distance_px <= reach_px {
+                    levels_adu.push(level_adu);
+                } else if distance_px > reach_px + AROUND_PX[0]
+                    && distance_px <= reach_px + AROUND_PX[1]
+                    && !level_adu.is_nan()
+                {
+                    around_adu.push(level_adu);
+                }
+            }
+        }
+        let is_whole = levels_adu
+            .iter()
+            .all(|level| *level < BRIGHTEST * white_adu);
+        clip(&mut around_adu);
+        (is_whole && !around_adu.is_empty()).then(|| Self {
+            star: *star,
+            levels_adu,
+            around_adu,
+            flux_per_light,
+        })
+    }
+
+    /// The star by a tone curve; `None` if it has no light.
+    pub fn by(&self, curve: &ToneCurve) -> Option<LitSpot> {
+        let count = self.levels_adu.len() as f64;
+        let around: Vec<f64> = self.around_adu.iter().map(|at| curve.light(*at)).collect();
+        let (sky, variance) = mean_and_variance(&around);
+        let (sky_adu, _) = mean_and_variance(&self.around_adu);
+        let (mut light, mut flux_adu, mut response_adu) = (0.0, 0.0, 0.0);
+        for level_adu in &self.levels_adu {
+            let over = curve.light(*level_adu) - sky;
+            light += over;
+            flux_adu += level_adu - sky_adu;
+            // Noise makes pixels darker than the sky.
+            response_adu += over / curve.light_per_adu(level_adu.max(sky_adu));
+        }
+        let noise = (variance * count * (1.0 + count / around.len() as f64)).sqrt();
+        let response = response_adu / flux_adu;
+        let is_seen = light > 0.0 && flux_adu > 0.0 && response > 0.0 && response.is_finite();
+        is_seen.then(|| LitSpot {
+            star: SkyStar {
+                measured: Some(Measured {
+                    instrumental_mag: instrumental_mag(light * self.flux_per_light),
+                    sigma_mag: MAG_PER_RELATIVE * noise / light,
+                }),
+                ..self.star
+            },
+            ln_response: libm::log(response),
+        })
+    }
+}
+
+/// Leaves out the levels of other stars.
+fn clip(levels_adu: &mut Vec<f64>) {
+    const SIGMAS: f64 = 3.0;
+    /// Levels of a picture are whole numbers.
+    const LEAST_SIGMA_ADU: f64 = 0.5;
+    if levels_adu.is_empty() {
+        return;
+    }
+    let middle = median(&mut levels_adu.clone());
+    let mut apart: Vec<f64> = levels_adu.iter().map(|at| (at - middle).abs()).collect();
+    let reach = SIGMAS * (SIGMA_PER_MAD * median(&mut apart)).max(LEAST_SIGMA_ADU);
+    levels_adu.retain(|level| (level - middle).abs() <= reach);
+}
+
+fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|value| (value - mean).powi(2));
+    (mean, squares.sum::<f64>() / count)
+}
