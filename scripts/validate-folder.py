@@ -2,7 +2,7 @@
 """Draws a folder as programs for all-sky cameras leave it, 200 files of ten kinds, runs `night`, `sky`,
 `process --out-parquet`, `archive` and `calibrate` over it, and compares what they count with the truth.
 
-    scripts/validate-folder.py target/release/starpipe [--frames 60] [--keep DIR]
+    scripts/validate-folder.py target/release/starpipe [--frames 40] [--keep DIR]
 
 Needs numpy, astropy and Pillow. Frames are simulated by starpipe, stretched to 8 bits and saved as JPEG
 with local times in their names; all else is drawn here. Exits with 1 where a count is not the truth.
@@ -94,7 +94,7 @@ class Folder:
         camera = self.work / "camera.toml"
         camera.write_text("".join(f"{key} = {value}\n" for key, value in CAMERA.items()))
         raw = self.work / "raw.fits"
-        pictures = []
+        pictures, full = [], None
         for number in range(count):
             local = START + datetime.timedelta(minutes=2 * number)
             utc = local - datetime.timedelta(hours=UTC_OFFSET_H)
@@ -108,7 +108,9 @@ class Folder:
             subprocess.run(command, check=True, capture_output=True)
             # Rows of FITS images are stored bottom-up.
             light = np.maximum(fits.getdata(raw)[::-1].astype(float) - 100, 0)
-            picture = 255 * np.sqrt(light / 6000)
+            # The stretch of the first frame is that of all.
+            full = full or 16 * np.median(light[disk() < 0.8])
+            picture = 255 * np.sqrt(light / full)
             jpeg(self.add("frame", f"image-{local:%Y%m%d%H%M%S}.jpg"), picture)
             pictures.append(picture)
         return pictures
@@ -168,10 +170,10 @@ class Folder:
             "hidden": [("._image-{}.jpg", b"\0\5\x16\7"), (".cache-{}", b"")],
             "unread": [("cut-{}.jpg", b"\xff\xd8\xff\xe0\0\x10JFIF"), ("empty-{}.jpg", b""), ("text-{}.jpg", b"not found\n")],
         }  # fmt: skip
-        for kind, files in contents.items():
-            for number in range(count):
-                name, content = files[number % len(files)]
-                self.add(kind, name.format(number)).write_bytes(content)
+        for number in range(count):
+            kind = list(contents)[number % len(contents)]
+            name, content = contents[kind][number // len(contents) % len(contents[kind])]
+            self.add(kind, name.format(number)).write_bytes(content)
 
     def draw(self, frames):
         pictures = self.frames(frames)
@@ -179,8 +181,7 @@ class Folder:
         self.day_and_twilight(max(frames // 4, 2), max(frames // 10, 2))
         self.products(pictures, names)
         self.calibration(max(frames // 12, 2))
-        rest = max(200 - len(self.kinds), 5)
-        self.others(rest // 5)
+        self.others(max(200 - len(self.kinds), 5))
         return self
 
     def count(self, *kinds):
@@ -251,7 +252,7 @@ def check_others(check, starpipe, folder, work):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("starpipe")
-    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--keep", type=pathlib.Path, help="directory for the folder and the results")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
