@@ -12,7 +12,8 @@
 //! 2. The light beyond a distance r is taken to fall as A r⁻ᵖ: p = 1 for diffraction, 5/3 for turbulence
 //!    (Racine 1996, PASP 108, 699), 2β − 2 for Moffat's profile. The rings tell A, and p as far as they can; what
 //!    they leave open is in the standard error.
-//! 3. Most frames have no wings, so that half of the probability is that of none before anything is measured.
+//!    Where they do not follow the power law, as those of an obstructed pupil, it is as much larger.
+//! 3. Most frames have no wings, so that most of the probability is that of none before anything is measured.
 
 use super::background::Mesh;
 use super::detection::{Detection, Wings};
@@ -40,6 +41,8 @@ const MAX_OTHERS: usize = 16;
 const MIN_SHARE: f64 = 0.02;
 /// Shares of the light that wings may have, all as likely before they are measured.
 const LIKELY_SHARES: [f64; 2] = [-0.05, 0.20];
+/// Share of the frames that have such wings.
+const LIKELY_FRAMES: f64 = 0.1;
 /// Stars farther than this many standard errors from the median do not count.
 const CLIP_SIGMAS: f64 = 3.0;
 
@@ -86,9 +89,9 @@ impl FluxScale {
     fn of(lacking: &Estimate) -> Self {
         let Estimate { value, sigma } = *lacking;
         let [least, most] = LIKELY_SHARES;
-        // The densities of what was measured, without wings and with any.
-        let without = normal_density(value / sigma) / sigma;
-        let with = 1.0 / (most - least);
+        // The probabilities of what was measured, without wings and with any.
+        let without = (1.0 - LIKELY_FRAMES) * normal_density(value / sigma) / sigma;
+        let with = LIKELY_FRAMES / (most - least);
         let is_likely = with > without;
         if is_likely && value.abs() > MIN_SHARE {
             return Self {
@@ -112,6 +115,8 @@ impl FluxScale {
 fn beyond(rings: &[Estimate]) -> Option<Estimate> {
     /// The exponents, in quarters.
     const QUARTERS: std::ops::RangeInclusive<u32> = 4..=16;
+    /// Chi² over the degrees of freedom that is no chance.
+    const MISFIT: f64 = 4.0;
     let fits = || {
         QUARTERS.map(|quarters| {
             let part_beyond =
@@ -122,12 +127,19 @@ fn beyond(rings: &[Estimate]) -> Option<Estimate> {
         })
     };
     let best = fits().map(|(_, chi2)| chi2).reduce(f64::min)?;
+    // What is left free by A and p.
+    let free = rings.len().saturating_sub(2).max(1) as f64;
+    let misfit = if best > MISFIT * free {
+        best / free
+    } else {
+        1.0
+    };
     let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
     for (Estimate { value, sigma }, chi2) in fits() {
-        let weight = libm::exp(-0.5 * (chi2 - best));
+        let weight = libm::exp(-0.5 * (chi2 - best) / misfit);
         weights += weight;
         sum += weight * value;
-        squares += weight * (value * value + sigma * sigma);
+        squares += weight * (value * value + misfit * sigma * sigma);
     }
     let value = sum / weights;
     let sigma = (squares / weights - value * value).max(0.0).sqrt();
@@ -321,12 +333,24 @@ mod tests {
     }
 
     #[test]
+    fn rings_that_follow_no_power_law_have_a_larger_error() {
+        // Airy's pattern of a pupil obstructed by a third, of which 0.194 lies beyond.
+        let rings = [0.0923, 0.0102, 0.0356].map(|value| Estimate {
+            value,
+            sigma: 0.003,
+        });
+        let found = beyond(&rings).unwrap();
+        assert!((found.value - 0.194).abs() < found.sigma, "{found:?}");
+    }
+
+    #[test]
     fn wings_that_may_be_chance_are_in_the_error_alone() {
         let of = |value: f64, sigma: f64| FluxScale::of(&Estimate { value, sigma });
         assert!(of(0.1, 0.01).wings.is_some() && of(-0.04, 0.005).wings.is_some());
+        assert!(of(0.04, 0.02).wings.is_none());
         let ordinary = of(0.003, 0.003);
         assert!(ordinary.wings.is_none() && ordinary.sigma < 0.0015);
-        let unclear = of(0.1, 0.06);
+        let unclear = of(0.1, 0.05);
         assert!(
             unclear.wings.is_none() && unclear.sigma > 0.05,
             "{unclear:?}"
