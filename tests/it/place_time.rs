@@ -40,12 +40,16 @@ fn all_sky() -> CentroidList {
         is_high.then_some(listed)
     });
     CentroidList {
-        width: SIDE_PX as usize,
-        height: SIDE_PX as usize,
+        width: Some(SIDE_PX as usize),
+        height: Some(SIDE_PX as usize),
         photometry: Photometry::JohnsonV,
         has_brightness: true,
         centroids: seen.collect(),
     }
+}
+
+fn solved_list(list: &CentroidList, context: &Context) -> Solution {
+    solve_centroids(list, context, &mut Workspace::new()).expect("the size is stated")
 }
 
 fn solved(place: [f64; 3], known: FrameDate, offset: Option<UtcOffset>) -> Solution {
@@ -53,7 +57,7 @@ fn solved(place: [f64; 3], known: FrameDate, offset: Option<UtcOffset>) -> Solut
     context.priors.site = Some(site(place));
     context.priors.date = Some(known);
     context.utc_offset = offset;
-    solve_centroids(&all_sky(), &context, &mut Workspace::new())
+    solved_list(&all_sky(), &context)
 }
 
 fn stated(date: &str) -> FrameDate {
@@ -174,10 +178,10 @@ fn a_narrow_frame_that_looks_down_is_noticed() {
     let mut context = Context::new(sky());
     context.priors.date = Some(stated(DATE));
     context.priors.site = Some(site(SITE));
-    let right = solve_centroids(&list, &context, &mut Workspace::new());
+    let right = solved_list(&list, &context);
     assert_eq!(right.place_time, None);
     context.priors.site = Some(site([-60.0, 11.0, 0.0]));
-    let wrong = solve_centroids(&list, &context, &mut Workspace::new());
+    let wrong = solved_list(&list, &context);
     let wrong = wrong.place_time.unwrap();
     assert!(
         proposes(&wrong, |change| *change == Change::LatitudeSign),
