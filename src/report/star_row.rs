@@ -25,8 +25,8 @@ impl StarRow {
             frame, "", "meta.id", "name of the frame";
             star.x, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
             star.y, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
-            star.sigma_x, "pix", "stat.error;pos.cartesian.x", "standard error of x";
-            star.sigma_y, "pix", "stat.error;pos.cartesian.y", "standard error of y";
+            star.sigma_x, "pix", "stat.error;pos.cartesian.x", "standard error of x as the place of the named star";
+            star.sigma_y, "pix", "stat.error;pos.cartesian.y", "standard error of y as the place of the named star";
             star.flux, "", "phot.flux", "flux above the background, in units of the frame";
             star.sigma_flux, "", "stat.error;phot.flux", "standard error of flux";
             star.peak, "", "phot.flux;stat.max", "brightest pixel above the background, in units of the frame";

@@ -79,10 +79,24 @@ impl ReportedPointing<'_> {
         star.p_chance = significant(star_match.p_chance, CHANCE_DIGITS);
         // The light of a single star has exactly the star's direction.
         let is_blend = star_match.light != apparent;
-        star.residual_blend_px = is_blend
-            .then(|| self.residual_px(star, &star_match.light))
-            .flatten();
+        if is_blend {
+            star.residual_blend_px = self.residual_px(star, &star_match.light);
+            self.add_shift(star, [&apparent, &star_match.light]);
+        }
         star.set_direction(&direction);
+    }
+
+    /// Adds the shift of a star's light by the stars that are blended with it to the errors of the star's place.
+    fn add_shift(&self, star: &mut StarReport, [own, light]: [&UnitVector<Icrs>; 2]) {
+        let places = [own, light].map(|direction| self.identification.pixel_of(direction));
+        let [Some(own), Some(light)] = places else {
+            return;
+        };
+        let with = |sigma_px: Option<f64>, shift_px: f64| {
+            significant(libm::hypot(sigma_px?, shift_px), SIGMA_DIGITS)
+        };
+        star.sigma_x = with(star.sigma_x, light.x - own.x);
+        star.sigma_y = with(star.sigma_y, light.y - own.y);
     }
 
     /// Distance of a detection from what appears in this direction, in pixels.

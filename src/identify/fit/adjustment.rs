@@ -68,8 +68,12 @@ pub(super) const USUAL_TERMS: [f64; LENS_TERMS] = [0.5, 0.5, 0.5, 3.0, 3.0, 0.05
 const FOLLOWED_TERMS: [f64; LENS_TERMS] = [0.5, 0.2, 0.1, 3.0, 3.0, 0.005, 0.005, 0.1, 0.02];
 /// The same of the axis where a lens is no pinhole: frames of these are not cut.
 const USUAL_AXIS_OF_FISHEYE: f64 = 0.1;
+/// The same of the terms by which a lens that is no pinhole differs from what the stars show. Such lenses follow
+/// the ideal projections within a few per cent (Schneider et al. 2009, ISPRS J. Photogramm. Remote Sens. 64, 259;
+/// Kumler & Bauer 2000, Proc. SPIE 4093, 360); pixels are square within a few thousandths.
+const UNSHOWN_TERMS: [f64; LENS_TERMS] = [0.03, 0.01, 0.005, 3.0, 3.0, 0.005, 0.005, 0.002, 0.002];
 /// The term that shifts the axis along x; the next does along y.
-const AXIS: usize = 3;
+pub(super) const AXIS: usize = 3;
 /// The same of the monomials.
 const USUAL_MONOMIAL: f64 = 0.02;
 
@@ -95,10 +99,37 @@ pub(super) enum Prior<'a> {
     Usual,
     /// What lenses are like that are followed from a window.
     Followed,
+    /// What lenses are like beyond their first terms, so many, which the stars show.
+    Beyond(usize),
     /// What lenses are like, and where the axis meets the frame.
-    Axis([f64; 2]),
+    Axis(KnownAxis),
     /// A lens that was measured, with this information (inverse covariance) on ln f and the terms.
     Known(&'a CameraModel, &'a DMatrix<f64>),
+}
+
+/// Where the axis of a lens meets the frame, as an offset from its centre, with the standard errors, in pixels.
+#[derive(Clone, Copy)]
+pub(super) struct KnownAxis {
+    at_px: [f64; 2],
+    sigma_px: [f64; 2],
+}
+
+impl KnownAxis {
+    /// That of a camera. The monomials can take the place of the axis: it stays where the lens has it. The attitude of
+    /// a lens that is no pinhole is that of its axis, and has all of the axis's error, `sigma_px`.
+    pub fn of(camera: &CameraModel, sigma_px: [f64; 2]) -> Self {
+        /// Standard error of an axis that stays.
+        const HELD_PX: f64 = 0.01;
+        let distortion = camera.distortion();
+        Self {
+            at_px: distortion.map_or([0.0; 2], Distortion::axis_offset_px),
+            sigma_px: if camera.is_pinhole() {
+                [HELD_PX; 2]
+            } else {
+                sigma_px.map(|sigma_px| sigma_px.max(HELD_PX))
+            },
+        }
+    }
 }
 
 /// The two equations of several stars, divided by their standard errors. The unknowns are a turn, the
@@ -301,16 +332,26 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         }
     }
 
-    /// The same with the axis that the camera has.
-    pub fn with_known_axis(mut self) -> Self {
-        self.prior = Prior::Axis(self.predictor.distortion.axis_offset_px());
-        self
+    /// The same with the axis that the camera has, with these errors.
+    pub fn with_known_axis(self, sigma_px: [f64; 2]) -> Self {
+        Self {
+            prior: Prior::Axis(KnownAxis::of(self.camera(), sigma_px)),
+            ..self
+        }
     }
 
     /// The same of a lens that is followed from a window.
     pub fn followed(self) -> Self {
         Self {
             prior: Prior::Followed,
+            ..self
+        }
+    }
+
+    /// The same of a lens of which the stars show the first terms, so many.
+    pub fn with_unshown_terms(self, shown: usize) -> Self {
+        Self {
+            prior: Prior::Beyond(shown),
             ..self
         }
     }
@@ -390,7 +431,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             Prior::Known(lens, information) => {
                 self.add_known(lens, information, &mut block, &mut vector)
             }
-            Prior::Usual | Prior::Followed | Prior::Axis(_) => {
+            Prior::Usual | Prior::Followed | Prior::Beyond(_) | Prior::Axis(_) => {
                 self.add_usual(&mut block, &mut vector)
             }
         };
@@ -403,16 +444,20 @@ impl<'a, const P: usize> Adjustment<'a, P> {
 
     /// Adds what lenses are like; returns how unusual the present one is.
     fn add_usual(&self, block: &mut SMatrix<f64, P, P>, vector: &mut SVector<f64, P>) -> f64 {
-        let (usual, axis_px) = match self.prior {
-            Prior::Axis(axis_px) => (&USUAL_TERMS, Some(axis_px)),
-            Prior::Followed => (&FOLLOWED_TERMS, None),
-            Prior::Usual | Prior::Known(..) => (&USUAL_TERMS, None),
+        let axis = match self.prior {
+            Prior::Axis(axis) => Some(axis),
+            _ => None,
         };
         let terms_px = &self.predictor.distortion.coefficients_px()[..P - POSE_PARAMETERS];
         let mut misfit = 0.0;
         for (term, known_px) in terms_px.iter().enumerate() {
             let camera = &self.predictor.camera;
-            let (expected_px, sigma_px) = usual_term_px(camera, usual, axis_px, term);
+            let usual = match self.prior {
+                Prior::Followed => &FOLLOWED_TERMS,
+                Prior::Beyond(shown) if term >= shown => &UNSHOWN_TERMS,
+                _ => &USUAL_TERMS,
+            };
+            let (expected_px, sigma_px) = usual_term_px(camera, usual, axis, term);
             let parameter = POSE_PARAMETERS + term;
             block[(parameter, parameter)] += sigma_px.powi(-2);
             vector[parameter] += expected_px * sigma_px.powi(-2);
@@ -535,15 +580,13 @@ impl<'a, const P: usize> Adjustment<'a, P> {
 pub(super) fn usual_term_px(
     camera: &CameraModel,
     usual: &[f64; LENS_TERMS],
-    axis_px: Option<[f64; 2]>,
+    axis: Option<KnownAxis>,
     term: usize,
 ) -> (f64, f64) {
-    /// Standard deviation of an axis that is known, in pixels.
-    const KNOWN_PX: f64 = 0.01;
     let radius_px = camera.radius_px();
     let of_axis = term.checked_sub(AXIS).filter(|along| *along < 2);
-    match (of_axis, axis_px) {
-        (Some(along), Some(axis_px)) => (axis_px[along], KNOWN_PX),
+    match (of_axis, axis) {
+        (Some(along), Some(axis)) => (axis.at_px[along], axis.sigma_px[along]),
         (Some(_), None) if !camera.is_pinhole() => (0.0, USUAL_AXIS_OF_FISHEYE * radius_px),
         _ => {
             let sigma = usual.get(term).unwrap_or(&USUAL_MONOMIAL);

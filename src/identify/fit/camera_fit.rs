@@ -3,7 +3,9 @@
 //! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera,
 //! attitude, covariance
 
-use super::adjustment::{Adjustment, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px};
+use super::adjustment::{
+    AXIS, Adjustment, LENS_PARAMETERS, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px,
+};
 use crate::base::coords::{Camera, Icrs, Rotation, small_turn_rad};
 use crate::camera::{CameraModel, Distortion, DistortionModel, KnownLens};
 use nalgebra::{Matrix4, SMatrix};
@@ -19,6 +21,8 @@ pub struct CameraFit {
     /// logarithm of the central focal length, marginalised over the distortion, for the stated
     /// standard errors.
     pub covariance: Matrix4<f64>,
+    /// Standard errors of where the axis of the lens meets the frame, in pixels; 0 where that is not fitted.
+    pub axis_sigma_px: [f64; 2],
     /// Free parameters.
     pub parameters: usize,
     /// Number of stars.
@@ -72,20 +76,41 @@ pub fn fit_camera(
         Some(BrownConrady) => fit!(BrownConrady),
         Some(Stretched) => fit!(Stretched),
         Some(irregular @ (Irregular3 | Irregular5)) => {
-            // The monomials can take the place of the axis: it stays where the lens has it.
-            let (camera, icrs_to_camera) = match fit!(Stretched) {
-                Some(lens) => (lens.camera, lens.icrs_to_camera),
-                None => (*camera, *icrs_to_camera),
+            let (camera, icrs_to_camera, axis_sigma_px) = match fit!(Stretched) {
+                Some(lens) => (lens.camera, lens.icrs_to_camera, lens.axis_sigma_px),
+                None => (*camera, *icrs_to_camera, [0.0; 2]),
             };
             if irregular == Irregular3 {
                 let cubic = adjustment!(Irregular3, &camera, &icrs_to_camera);
-                cubic.with_known_axis().fit(residuals_px)
+                cubic.with_known_axis(axis_sigma_px).fit(residuals_px)
             } else {
                 let quintic = adjustment!(Irregular5, &camera, &icrs_to_camera);
-                quintic.with_known_axis().fit(residuals_px)
+                quintic.with_known_axis(axis_sigma_px).fit(residuals_px)
             }
         }
     }
+}
+
+/// Fits the attitude and a lens that is no pinhole with all terms of lenses, from `camera` on, whose terms are those
+/// that the stars show: of the others is known what lenses are like. A lens's axis is where these terms put it, so
+/// an attitude without them has a smaller error than the truth. Sets `residuals_px` as [`fit_camera`]; `None` for the
+/// same reasons.
+pub(super) fn fit_with_unshown_terms(
+    stars: &[MeasuredStar],
+    camera: &CameraModel,
+    icrs_to_camera: &Rotation<Icrs, Camera>,
+    residuals_px: &mut Vec<[f64; 2]>,
+) -> Option<CameraFit> {
+    let all = Some(DistortionModel::Stretched);
+    let shown = camera.distortion_model().map_or(0, DistortionModel::terms);
+    let fit = Adjustment::<LENS_PARAMETERS>::new(stars, camera, icrs_to_camera, all)
+        .with_unshown_terms(shown)
+        .fit(residuals_px)?;
+    Some(CameraFit {
+        // The others use up no star.
+        parameters: POSE_PARAMETERS + shown,
+        ..fit
+    })
 }
 
 /// Fits the attitude, and a lens that is known but for its errors, starting from `icrs_to_camera`. Sets
@@ -138,11 +163,17 @@ impl<const P: usize> Adjustment<'_, P> {
     fn finish(self, normal: &Normal<P>, residuals_px: &mut Vec<[f64; 2]>) -> Option<CameraFit> {
         all_residuals_px(&self, residuals_px)?;
         let by_parameters = central_pose_by_parameters::<P>(self.camera());
-        let covariance = by_parameters * normal.root.inverse() * by_parameters.transpose();
+        let of_all = normal.root.inverse();
+        let covariance = by_parameters * of_all * by_parameters.transpose();
+        let axis_sigma_px = [0, 1].map(|along| {
+            let parameter = POSE_PARAMETERS + AXIS + along;
+            of_all.get((parameter, parameter)).map_or(0.0, |v| v.sqrt())
+        });
         Some(CameraFit {
             camera: *self.camera(),
             icrs_to_camera: self.icrs_to_camera(),
             covariance,
+            axis_sigma_px,
             parameters: P,
             stars: self.stars.len(),
         })

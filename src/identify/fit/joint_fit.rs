@@ -3,7 +3,7 @@
 //! The normal equations are sparse: the attitude of a frame meets the lens and no other attitude.
 //! Attitudes are eliminated frame by frame, and what is left are the equations of the lens.
 
-use super::adjustment::{MeasuredStar, Predictor, USUAL_TERMS, usual_term_px};
+use super::adjustment::{KnownAxis, MeasuredStar, Predictor, USUAL_TERMS, usual_term_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{CameraModel, Distortion, DistortionModel};
 use nalgebra::{
@@ -44,19 +44,18 @@ pub(crate) fn fit_jointly(
     model: Option<DistortionModel>,
 ) -> Option<JointFit> {
     let mut camera = *camera;
-    let mut axis_px = None;
+    let mut axis = None;
     if model >= Some(DistortionModel::Irregular3) {
-        // The monomials can take the place of the axis: it stays where the lens has it.
         let lens = fit_jointly(frames, &camera, Some(DistortionModel::Stretched))?;
         camera = lens.camera;
-        axis_px = camera.distortion().map(Distortion::axis_offset_px);
+        axis = Some(KnownAxis::of(&camera, [0.0; 2]));
     }
     let predictor = |frame: &JointFrame| Predictor::new(&camera, &frame.icrs_to_camera, model);
     let joint = Joint {
         frames,
         predictors: frames.iter().map(predictor).collect(),
         model,
-        axis_px,
+        axis,
     };
     joint.fit()
 }
@@ -141,7 +140,7 @@ struct Joint<'a> {
     frames: &'a [JointFrame],
     predictors: Vec<Predictor>,
     model: Option<DistortionModel>,
-    axis_px: Option<[f64; 2]>,
+    axis: Option<KnownAxis>,
 }
 
 /// The equations of the attitude of a frame.
@@ -249,7 +248,7 @@ impl Joint<'_> {
             .map_or(&[][..], Distortion::coefficients_px);
         let mut misfit = 0.0;
         for (term, present_px) in terms_px.iter().enumerate() {
-            let (expected_px, sigma_px) = usual_term_px(camera, &USUAL_TERMS, self.axis_px, term);
+            let (expected_px, sigma_px) = usual_term_px(camera, &USUAL_TERMS, self.axis, term);
             matrix[(1 + term, 1 + term)] += sigma_px.powi(-2);
             vector[1 + term] += (expected_px - present_px) * sigma_px.powi(-2);
             misfit += ((present_px - expected_px) / sigma_px).powi(2);

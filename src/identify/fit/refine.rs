@@ -4,6 +4,7 @@
 //! support
 
 use super::adjustment::robust_sigma_px;
+use super::camera_fit::fit_with_unshown_terms;
 use super::lens_choice::{
     ChosenLens, Lens, LensChoice, depend_on_place, is_affordable, with_projection,
 };
@@ -269,8 +270,29 @@ impl Refiner {
                 break;
             }
         }
-        current.fit.covariance += among_lenses;
-        Some(current)
+        let mut whole = self
+            .with_unshown_terms(problem, &current)
+            .unwrap_or(current);
+        whole.fit.covariance += among_lenses;
+        Some(whole)
+    }
+
+    /// The fit with the terms of the lens, too, that the stars do not show. `None` where there are none, and of a
+    /// pinhole: its attitude is that of the frame's centre, which these hardly move.
+    fn with_unshown_terms(&mut self, problem: Problem, current: &Refined) -> Option<Refined> {
+        let CameraFit {
+            camera,
+            icrs_to_camera,
+            ..
+        } = &current.fit;
+        let shows_all = camera.distortion_model() >= Some(DistortionModel::Stretched);
+        if shows_all || camera.is_pinhole() || self.known_lens(problem.field).is_some() {
+            return None;
+        }
+        self.measure(problem, current.excess_sigma_px);
+        let residuals_px = &mut self.residuals_px;
+        let fit = fit_with_unshown_terms(&self.stars, camera, icrs_to_camera, residuals_px)?;
+        Some(self.refined(problem, fit))
     }
 
     /// Computes the probabilities of all candidates for a name under `current`.
@@ -344,23 +366,27 @@ impl Refiner {
     /// The fit to the pairs, from `guess`.
     fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
         self.measure(problem, guess.excess_sigma_px);
-        let known_lens = self.known_lens(problem.field).cloned();
-        let mut fit = match &known_lens {
-            Some(lens) => self.fit_known_lens(lens, guess.hypothesis),
+        let fit = match self.known_lens(problem.field).cloned() {
+            Some(lens) => self.fit_known_lens(&lens, guess.hypothesis),
             None => self.fit_lens(guess),
         }?;
+        Some(self.refined(problem, fit))
+    }
+
+    /// What a fit to the pairs says.
+    fn refined(&mut self, problem: Problem, mut fit: CameraFit) -> Refined {
         let excess_sigma_px = self.excess_sigma_of(problem, fit.parameters);
-        if known_lens.is_none() && excess_sigma_px == 0.0 {
+        if self.known_lens(problem.field).is_none() && excess_sigma_px == 0.0 {
             fit.covariance *= self.overstated(fit.parameters);
         }
         for (pair, [x, y]) in self.pairs.iter_mut().zip(&self.residuals_px) {
             pair.residual_px = (x * x + y * y).sqrt();
         }
-        Some(Refined {
+        Refined {
             fit,
             zero_point_mag: self.zero_point_mag(problem),
             excess_sigma_px,
-        })
+        }
     }
 
     /// The fit of a lens to the stars.
