@@ -359,12 +359,13 @@ impl Rules {
     fn of(pictures: &[Picture], cameras: Cameras) -> Self {
         let plain = || pictures.iter().filter(|picture| picture.by_name.is_none());
         let mut counts: BTreeMap<[u32; 2], usize> = BTreeMap::new();
-        for size in plain().filter_map(|picture| picture.size) {
+        let sizes = plain().filter_map(|picture| picture.size);
+        for size in sizes.filter(|size| !size.contains(&0)) {
             *counts.entry(size).or_default() += 1;
         }
         let pixels = |(size, count): &([u32; 2], usize)| {
             let [width, height] = size.map(u64::from);
-            width * height * *count as u64
+            (width * height).saturating_mul(*count as u64)
         };
         let main = counts
             .into_iter()
@@ -385,20 +386,20 @@ impl Rules {
     }
 
     fn kind(&self, picture: &Picture) -> Option<OtherFile> {
+        /// Ratios of width to height that are of one shape differ by this factor at most,
+        const SAME_SHAPE: f64 = 1.05;
+        /// and by this one at least if the shapes differ.
+        const OTHER_SHAPE: f64 = 1.5;
         if self.copies.contains(&picture.path) {
             return Some(OtherFile::Copy);
         }
         if let Some(kind) = picture.by_name.filter(|_| self.has_plain) {
             return Some(kind);
         }
-        let ([width, height], [main_width, main_height]) = (picture.size?, self.main?);
-        /// Shapes differ where the ratios of their sides do by this factor.
-        const SAME_SHAPE: f64 = 1.05;
-        const OTHER_SHAPE: f64 = 1.5;
-        let ratio =
-            f64::from(width) * f64::from(main_height) / (f64::from(height) * f64::from(main_width));
+        let (size, main) = (picture.size.filter(|size| !size.contains(&0))?, self.main?);
+        let ratio = aspect(size) / aspect(main);
         let unlike = ratio.max(ratio.recip());
-        let is_small = 2 * width <= main_width && 2 * height <= main_height;
+        let is_small = size[0] <= main[0] / 2 && size[1] <= main[1] / 2;
         let is_of_one = self.cameras != Cameras::Any;
         if is_small
             && (self.moments.contains(&picture.moment()) || is_of_one && unlike < SAME_SHAPE)
@@ -408,6 +409,11 @@ impl Rules {
             (is_of_one && unlike > OTHER_SHAPE).then_some(OtherFile::Keogram)
         }
     }
+}
+
+/// The longer side over the shorter one: a camera may be turned.
+fn aspect([width, height]: [u32; 2]) -> f64 {
+    f64::from(width.max(height)) / f64::from(width.min(height))
 }
 
 /// The pictures with the same bytes as another one. Of these, the one with a date in its name is the frame, or
@@ -544,6 +550,7 @@ mod tests {
         folder.picture("keogram-20260115.png", [64, 48]);
         folder.picture("allsky-startrail_ccd1_20260115_night.png", [64, 48]);
         folder.picture("strip.png", [64, 12]);
+        folder.picture("turned.png", [48, 64]);
         folder.picture("small.png", [16, 12]);
         folder.file("allsky-20260115.mp4", b"\0\0\0\x18ftypisom\0\0\0\0isom");
         folder.file("x.mkv", b"\x1a\x45\xdf\xa3");
@@ -559,7 +566,7 @@ mod tests {
             .file("empty.jpg", b"")
             .file("cut.jpg", b"\xff\xd8\xff\xe0");
         let (frames, others) = folder.sorted(Cameras::OneNight);
-        assert_eq!(frames.len(), 4 + 2, "{frames:?}");
+        assert_eq!(frames.len(), 4 + 3, "{frames:?}");
         let expected = [
             ("._image.png", "hidden"),
             (".DS_Store", "hidden"),

@@ -18,7 +18,7 @@ pub(super) fn text(night: &NightSummary) -> String {
     );
     if !night.passed_over.is_empty() {
         let counts: Vec<String> = night.passed_over.iter().map(passed_over).collect();
-        let _ = writeln!(text, "passed     over: {}", counts.join(", "));
+        let _ = writeln!(text, "other      {}: passed over", counts.join(", "));
     }
     let _ = writeln!(text, "hours      {}", hours(night));
     if let Some(hour) = &night.darkest_hour {
