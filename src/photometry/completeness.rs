@@ -411,6 +411,44 @@ mod tests {
     use crate::base::statistics::normal_cdf;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    #[test]
+    fn where_no_star_is_missed_all_are_bright_enough_and_stars_near_a_fall_are_seen_too_bright() {
+        let star = |number: u32| CountedStar {
+            v_mag: 4.0 + 0.05 * f64::from(number),
+            detected: true,
+        };
+        let all = measure(&(0..60).map(star).collect::<Vec<_>>(), 0.001);
+        assert_eq!(all.limit, Err(NoLimit::CatalogEnds));
+        assert!(all.fall.unwrap().is_complete_at(6.0), "{all:?}");
+        let fall = Fall {
+            v_mag: 8.0,
+            width_mag: 0.3,
+        };
+        assert!(fall.is_complete_at(7.3) && !fall.is_complete_at(7.5));
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        for (v_mag, sigma_mag) in [(6.5, 0.2), (7.8, 0.2), (8.0, 0.3), (8.3, 0.25)] {
+            // The rest of the width is not of the flux.
+            let rest_mag = f64::sqrt(0.3 * 0.3 - sigma_mag * sigma_mag);
+            let (mut brighter_mag, mut detected) = (0.0, 0.0);
+            for _ in 0..40_000 {
+                let [noise, other] = [(); 2].map(|()| random.sample::<f64, _>(StandardNormal));
+                if v_mag + sigma_mag * noise + rest_mag * other < fall.v_mag {
+                    brighter_mag -= sigma_mag * noise;
+                    detected += 1.0;
+                }
+            }
+            let (found_mag, expected_mag) = (
+                brighter_mag / detected,
+                fall.brightening_mag(v_mag, sigma_mag),
+            );
+            assert!(
+                (found_mag - expected_mag).abs() < 0.012,
+                "{found_mag} {expected_mag}"
+            );
+        }
+    }
 
     /// The parameters of simulated stars.
     #[derive(Debug, Clone, Copy)]

@@ -49,6 +49,21 @@ fn drawn_frames_have_their_zero_point() {
 }
 
 #[test]
+fn a_frame_without_a_zero_point_says_why() {
+    let report = &processed(&["--max-stars", "20"], &[fixture("orion/orion.png")])[0];
+    let photometry = &report["photometry"];
+    assert!(photometry["zero_point_vmag"].is_null(), "{photometry}");
+    let reason = &photometry["no_zero_point"];
+    assert_eq!(reason["code"], "few_stars_fit");
+    assert!(
+        reason["text"]
+            .as_str()
+            .unwrap()
+            .contains("a zero point takes 5")
+    );
+}
+
+#[test]
 fn the_limit_of_a_drawn_frame_is_that_of_its_noise() {
     let report = &processed(&["--sigma", "6"], &[fixture("cygnus/cygnus.tif")])[0];
     // A star is detected where the matched filter's signal exceeds 6 standard deviations of sky and

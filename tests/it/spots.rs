@@ -166,10 +166,10 @@ fn the_light_of_wings_is_in_the_fluxes() {
         pulls.flux_ratios.sort_unstable_by(f64::total_cmp);
         let ratio = pulls.flux_ratios[pulls.flux_ratios.len() / 2];
         println!("{wings:?}, median flux over the true one {ratio:.4}");
-        // Without them, that share would be missing. Of the rest, 1 % lies beyond where they are
-        // looked for, and fits of faint stars lack 2 % more than those of the bright ones.
+        // Without them, that share would be missing. Fits of faint stars lack up to 2 % more than those of
+        // the bright ones.
         assert!((0.05..0.2).contains(&wings.share), "{wings:?}");
-        assert!((ratio - 0.97).abs() < 0.02, "{ratio}");
+        assert!((ratio - 0.99).abs() < 0.025, "{ratio}");
         assert!(detected(&gaussian, seed).0.wings.is_none());
     }
 }
