@@ -441,14 +441,7 @@ impl fmt::Display for Note {
             Self::LensOfOtherSize { known_px, found_px } => {
                 write_other_size(f, *known_px, *found_px)
             }
-            Self::WrongHeaderScale {
-                pixel_scale_rad: [low_rad, high_rad],
-            } => write!(
-                f,
-                "the header's focal length and pixel size are not this frame's: they mean {:.1}″ to {:.1}″ a pixel",
-                low_rad * ARCSEC_PER_RAD,
-                high_rad * ARCSEC_PER_RAD
-            ),
+            Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
                 "the site, the date and the attitude contradict each other: the frame's centre stands {:.1}° below the horizon",
@@ -456,23 +449,9 @@ impl fmt::Display for Note {
             ),
             Self::SiteOrTime(wrong) => wrong.fmt(f),
             Self::SizeGuessed {
-                size_px: [width, height],
+                size_px,
                 centre_sigma_px,
-            } => {
-                write!(
-                    f,
-                    "the size of the frame is not stated, and was taken to be {width} × {height} pixels, as \
-                     far as the centroids reach"
-                )?;
-                let Some([x, y]) = centre_sigma_px else {
-                    return Ok(());
-                };
-                write!(
-                    f,
-                    "; the true centre may be off by {x:.0} px along x and {y:.0} px along y, and the stated \
-                     errors include that"
-                )
-            }
+            } => write_guessed_size(f, *size_px, *centre_sigma_px),
             Self::MoreStars { wanted } => write!(
                 f,
                 "the brightest {wanted} detections, as many as were to be measured, did not identify the \
@@ -495,12 +474,7 @@ impl fmt::Display for Note {
             Self::Wings(wings) => write_wings(f, wings),
             Self::StarTrails(trails) => write_trails(f, trails),
             Self::Trails(trails) => write_lines(f, trails),
-            Self::DoubleImage(double) => write!(
-                f,
-                "every star is there twice: {double}; fluxes, zero point and limit are those of one of the \
-                 two images, and positions and attitude are off by up to that offset: the stated error of the \
-                 attitude has half of it"
-            ),
+            Self::DoubleImage(double) => write_double(f, double),
             Self::RepeatedSky(repeated) => repeated.fmt(f),
             Self::DarkExposure(mismatch) => mismatch.fmt(f),
             Self::BodyInFrame(seen) => write_body(f, seen),
@@ -519,6 +493,43 @@ impl fmt::Display for Note {
             } => write_residuals(f, *rms_px, *excess_sigma_px),
         }
     }
+}
+
+fn write_guessed_size(
+    f: &mut fmt::Formatter<'_>,
+    [width, height]: [usize; 2],
+    centre_sigma_px: Option<[f64; 2]>,
+) -> fmt::Result {
+    write!(
+        f,
+        "the size of the frame is not stated, and was taken to be {width} × {height} pixels, as far as \
+         the centroids reach"
+    )?;
+    let Some([x, y]) = centre_sigma_px else {
+        return Ok(());
+    };
+    write!(
+        f,
+        "; the true centre may be off by {x:.0} px along x and {y:.0} px along y, and the stated errors \
+         include that"
+    )
+}
+
+fn write_header_scale(f: &mut fmt::Formatter<'_>, pixel_scale_rad: [f64; 2]) -> fmt::Result {
+    let [low, high] = pixel_scale_rad.map(|rad| rad * ARCSEC_PER_RAD);
+    write!(
+        f,
+        "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+    )
+}
+
+fn write_double(f: &mut fmt::Formatter<'_>, double: &DoubleImage) -> fmt::Result {
+    write!(
+        f,
+        "every star is there twice: {double}; fluxes, zero point and limit are those of one of the two \
+         images, and positions and attitude are off by up to that offset: the stated error of the attitude \
+         has half of it"
+    )
 }
 
 fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64) -> fmt::Result {

@@ -186,7 +186,7 @@ fn solve(
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
-    let (raw, mut clock) = (input.frame, input.clock);
+    let (raw, calibration, mut clock) = (input.frame, input.calibration, input.clock);
     let priors = context.priors_of(raw, input.name);
 
     let config = context.detect_config(raw);
@@ -201,13 +201,7 @@ fn solve(
     };
     let Some(mut stars) = stage.run(&config, &mut clock)? else {
         let timing = clock.timing();
-        return Ok(not_in_time(
-            raw,
-            input.calibration,
-            &priors,
-            context,
-            timing,
-        ));
+        return Ok(not_in_time(raw, calibration, &priors, context, timing));
     };
     let mut more_stars = None;
     if stars.may_lack_stars(&config) {
@@ -240,7 +234,7 @@ fn solve(
     let mut solved = SolvedFrame {
         context,
         frame,
-        calibration: input.calibration,
+        calibration,
         mosaic,
         observation: observation(&outcome, &priors),
         priors,
@@ -263,7 +257,7 @@ fn solve(
         solved.measure_photometry();
         comparison = solved.compare_with_camera();
         if context.measure_sky || (context.measure_known_sky && solved.shows_whole_sky()) {
-            let colors = || colors_of(&prepared, input.calibration, context, workspace);
+            let colors = || colors_of(&prepared, calibration, context, workspace);
             solved.measure_sky(comparison.as_ref(), &colors);
         }
     }

@@ -157,16 +157,20 @@ fn optics() -> OpticsReport {
     }
 }
 
+fn date() -> DateReport {
+    DateReport {
+        iso: "2019-07-29T20:47:26Z".into(),
+        year: 2019.5739,
+        source: DateSource::FileName,
+        utc_offset_h: Some(0.0),
+        utc_offset_source: Some("assumed"),
+        uncertainty_h: 14.0,
+    }
+}
+
 fn identified() -> FrameReport {
     FrameReport {
-        date: Some(DateReport {
-            iso: "2019-07-29T20:47:26Z".into(),
-            year: 2019.5739,
-            source: DateSource::FileName,
-            utc_offset_h: Some(0.0),
-            utc_offset_source: Some("assumed"),
-            uncertainty_h: 14.0,
-        }),
+        date: Some(date()),
         observation: Some(ObservationReport {
             site: SiteReport {
                 lat_deg: 52.22,

@@ -36,6 +36,14 @@ pub enum NoBrightness {
 }
 
 impl NoBrightness {
+    /// Why there is none in a frame with this clear sky, where its dark level is known or not.
+    pub(super) fn of(dark: Option<&DarkLevel>, clear_sky: &ClearSky) -> Self {
+        match dark {
+            None if !clear_sky.has_tone_curve() => Self::BiasUnknown,
+            _ => Self::NotLinear,
+        }
+    }
+
     /// Its code in reports.
     pub const fn code(self) -> &'static str {
         match self {

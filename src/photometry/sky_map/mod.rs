@@ -155,11 +155,8 @@ pub fn measure(
         (false, _) if usual.is_some() => None,
         (false, _) => measured.with_unknown_curve(),
     };
-    let no_brightness = match dark {
-        None if !clear_sky.has_tone_curve() => NoBrightness::BiasUnknown,
-        _ => NoBrightness::NotLinear,
-    };
-    let no_brightness = Some(no_brightness).filter(|_| curved.is_none());
+    let reason = || NoBrightness::of(dark.as_ref(), &clear_sky);
+    let no_brightness = curved.is_none().then(reason);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
         grid: &grid,

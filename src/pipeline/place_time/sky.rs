@@ -42,7 +42,7 @@ impl<'a> Sky<'a> {
             let sigma_px = source.measured.map_or([found.rms_px; 2], |m| m.sigma_px);
             NamedStar {
                 source: named.source,
-                airless: airless.of(&star),
+                airless: airless.of(star),
                 pixel: source.position,
                 sigma_px: libm::hypot(sigma_px[0], sigma_px[1]) / std::f64::consts::SQRT_2,
                 v_mag: f64::from(star.v_mag),

@@ -77,7 +77,7 @@ impl Spot {
             .iter()
             .all(|level| *level < BRIGHTEST * white_adu);
         clip(&mut around_adu);
-        (is_whole && !around_adu.is_empty()).then(|| Self {
+        (is_whole && !around_adu.is_empty()).then_some(Self {
             star: *star,
             levels_adu,
             around_adu,
