@@ -50,6 +50,8 @@ pub(crate) struct UnknownCentre {
     pub mean_px: Vector2<f64>,
     /// Mean square.
     pub square_px2: Vector2<f64>,
+    /// Standard deviation of the distance of the lens's axis from the true centre, on each axis, in pixels.
+    pub axis_sigma_px: f64,
 }
 
 impl Identification {
@@ -73,6 +75,10 @@ impl Identification {
         let common = -along_x * mean_rad.x * mean_rad.y;
         covariance[(0, 1)] += common;
         covariance[(1, 0)] += common;
+        // The way from one pixel to another, and that over the axis of the lens, differ by the excess of the
+        // triangle: half of what the two offsets span.
+        let axis_rad = centre.axis_sigma_px / focal_px;
+        covariance[(2, 2)] += axis_rad * axis_rad * square_rad2.sum() / 4.0;
         let scale = SCALE * square_rad2.sum();
         self.focal_length_sigma_px = libm::hypot(self.focal_length_sigma_px, scale * focal_px);
     }

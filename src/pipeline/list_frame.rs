@@ -18,6 +18,10 @@ use crate::identify::fit::{JointFrame, MeasuredStar, fit_jointly, robust_sigma_p
 use crate::identify::{Identification, UnknownCentre};
 use nalgebra::Vector2;
 
+/// How far the axis of a lens is from the centre of its frames: standard deviation on each axis, in units of
+/// half the diagonal.
+const USUAL_AXIS: f64 = 0.03;
+
 /// The size of the frame of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ListFrame {
@@ -63,6 +67,7 @@ impl ListFrame {
         found.add_unknown_centre(&UnknownCentre {
             mean_px: Vector2::new(x.mean_px, y.mean_px),
             square_px2: Vector2::new(x.square_px2, y.square_px2),
+            axis_sigma_px: USUAL_AXIS * found.camera.radius_px(),
         });
     }
 }
@@ -148,9 +153,6 @@ impl Reach {
 /// Where the stars see the axis of the lens, from the centre of the guessed frame along x and y, with the
 /// error as a measure of the frame's centre; `None` where they do not tell it, or the lens is no pinhole.
 fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]> {
-    /// How far the axis of a lens is from the centre of its frames: standard deviation on each axis, in
-    /// units of half the diagonal.
-    const USUAL: f64 = 0.03;
     /// The places of the axis in the covariance, after ln f and three radial terms.
     const AXIS: [usize; 2] = [4, 5];
     if !found.camera.is_pinhole() {
@@ -172,7 +174,7 @@ fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]
     let model = Some(DistortionModel::BrownConrady);
     let fit = fit_jointly(&[frame], &found.camera, model)?;
     let (axis, centre) = (fit.camera.axis(), fit.camera.centre());
-    let usual_px = USUAL * fit.camera.radius_px();
+    let usual_px = USUAL_AXIS * fit.camera.radius_px();
     let measure = |value_px: f64, parameter: usize| Measure {
         value_px,
         sigma_px: libm::hypot(fit.covariance[(parameter, parameter)].sqrt(), usual_px),
