@@ -27,7 +27,9 @@ mod color;
 mod dark_level;
 mod depth;
 mod grid;
+mod lens_circle;
 mod limits;
+mod neighbor;
 mod picture;
 mod relative_limit;
 mod stars;
@@ -101,6 +103,11 @@ pub struct SkyCell {
     pub extinction_mag: Option<Estimate>,
     /// Probability that this is below [`CLEAR_MAG`].
     pub clear: Option<f64>,
+    /// The same if clouds are smooth, and if they are broken: the clouds' texture decides in between.
+    pub clear_band: Option<[f64; 2]>,
+    /// Flux at which half of the stars are detected, in ADU, without what the lens is known to take.
+    #[doc(hidden)]
+    pub threshold_adu: f64,
     /// V magnitude at which half of the stars should be detected, without clouds.
     pub expected_limit_vmag: Option<f64>,
     /// V magnitude at which half of the stars around it are detected.
@@ -130,12 +137,7 @@ pub fn measure(
         None => ClearSky::of(&stars, picture.is_flat)?,
     };
     let grid = Grid::over(frame);
-    // A flat divides unlit pixels by what is no light.
-    let unlit = || match picture.is_flat {
-        true => None,
-        false => DarkLevel::of_unlit_pixels(picture.frame, frame.detections),
-    };
-    let dark = picture.dark.or_else(unlit).or(picture.usual_dark);
+    let dark = dark_level(frame, picture);
     let is_proportional = is_proportional(picture, &clear_sky, usual.is_some());
     let color = dark
         .filter(|_| is_proportional)
@@ -155,8 +157,8 @@ pub fn measure(
         (false, _) if usual.is_some() => None,
         (false, _) => measured.with_unknown_curve(),
     };
-    let reason = || NoBrightness::of(dark.as_ref(), &clear_sky);
-    let no_brightness = curved.is_none().then(reason);
+    let no_brightness = || NoBrightness::of(dark.as_ref(), &clear_sky);
+    let no_brightness = curved.is_none().then(no_brightness);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = Sky {
         grid: &grid,
@@ -184,6 +186,8 @@ pub fn measure(
         detected: clouds[cell].detected,
         extinction_mag: clouds[cell].extinction_mag,
         clear: clouds[cell].clear,
+        clear_band: clouds[cell].clear_band,
+        threshold_adu: levels.cells[cell].limit_adu,
         expected_limit_vmag: limits[cell].expected_vmag,
         limit_vmag: limits[cell].measured_vmag,
     });
@@ -198,6 +202,16 @@ pub fn measure(
         clear_sky,
         cells,
     })
+}
+
+/// The level of a pixel without light: stated, of pixels that no light reaches, or of other frames of the camera.
+fn dark_level(frame: &IdentifiedFrame, picture: &Picture) -> Option<DarkLevel> {
+    // A flat divides unlit pixels by what is no light.
+    let unlit = || match picture.is_flat {
+        true => None,
+        false => DarkLevel::of_unlit_pixels(picture.frame, frame.detections),
+    };
+    picture.dark.or_else(unlit).or(picture.usual_dark)
 }
 
 /// Whether gray levels are taken to be proportional to light: stars show no tone curve, and the file has more than
