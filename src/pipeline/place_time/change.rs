@@ -130,7 +130,11 @@ pub(super) fn candidates(
         let (_, lat_rad) = level.to_ra_dec();
         let lon_deg = stated.0.lon_deg() + turn_deg?;
         let lon_deg = (lon_deg + 180.0).rem_euclid(360.0) - 180.0;
-        let site = stated.0.moved_to(lat_rad * DEG_PER_RAD, lon_deg)?;
+        // A camera is not level to a tenth of a degree.
+        let rough = |deg: f64| (10.0 * deg).round() / 10.0;
+        let site = stated
+            .0
+            .moved_to(rough(lat_rad * DEG_PER_RAD), rough(lon_deg))?;
         Some(Candidate {
             change: Change::Place,
             site,

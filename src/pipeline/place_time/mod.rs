@@ -32,7 +32,6 @@ use super::outcome::Outcome;
 use super::solution::Source;
 use crate::base::clock::UtcOffset;
 use crate::base::epoch::ObservationDate;
-use crate::base::statistics::log10_poisson_binomial_tail;
 use crate::identify::{DateZone, FrameDate, Priors};
 use crate::sky::catalog::Catalog;
 use crate::sky::observer::{Observation, Site};
@@ -292,8 +291,7 @@ impl Assessed<'_, '_> {
             .below
             .iter()
             .map(|chance| chance.max(Self::LEAST_CHANCE));
-        let chances: Vec<f64> = chances.collect();
-        log10_poisson_binomial_tail(&chances, chances.len(), &mut Vec::new())
+        chances.map(libm::log10).sum()
     }
 
     /// Whether anything speaks against it.
