@@ -127,6 +127,10 @@ pub struct SkyCellReport {
     pub extinction_sigma_mag: Option<f64>,
     /// Probability that this is below 0.2 mag.
     pub clear: Option<f64>,
+    /// The same if clouds are smooth and rather thicker.
+    pub clear_low: Option<f64>,
+    /// The same if they are broken and rather thinner.
+    pub clear_high: Option<f64>,
     /// V magnitude at which half of the stars should be detected, without clouds.
     pub expected_limit_vmag: Option<f64>,
     /// V magnitude at which half of the stars around it are detected.
@@ -230,6 +234,12 @@ impl SkyCellReport {
             extinction_mag: extinction.map(|extinction| mag(extinction.value)),
             extinction_sigma_mag: extinction.map(|extinction| mag(extinction.sigma)),
             clear: cell.clear.map(|clear| to_decimals(clear, SHARE_DECIMALS)),
+            clear_low: cell
+                .clear_band
+                .map(|[low, _]| to_decimals(low, SHARE_DECIMALS)),
+            clear_high: cell
+                .clear_band
+                .map(|[_, high]| to_decimals(high, SHARE_DECIMALS)),
             expected_limit_vmag: cell.expected_limit_vmag.map(mag),
             limit_vmag: limit.map(|limit| mag(limit.value)),
             limit_sigma_mag: limit.map(|limit| mag(limit.sigma)),

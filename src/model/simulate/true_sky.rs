@@ -30,6 +30,16 @@ impl TrueSky<'_> {
         Some(light_e / solid_angle_sr(self.camera, place)?)
     }
 
+    /// Part of a star's light that air, clouds and lens let through to `place`, over that of the centre's airmass.
+    pub fn transmission(&self, place: &PixelPoint) -> f64 {
+        self.sky.transmission(place)
+    }
+
+    /// What of that is the lens's part.
+    pub fn lens(&self, place: &PixelPoint) -> f64 {
+        self.sky.lens(place)
+    }
+
     /// V magnitudes per square arcsecond of so many electrons of a steradian.
     pub fn mag_arcsec2(&self, electrons_per_sr: f64) -> f64 {
         let center_sr = solid_angle_sr(self.camera, &self.camera.centre()).unwrap_or(f64::NAN);

@@ -5,6 +5,7 @@ use super::clear_sky::{ClearSky, USUAL_SKY_BV_MAG};
 use super::color::{ColorIndex, SkyColors};
 use super::dark_level::DarkLevel;
 use super::grid::Grid;
+use super::lens_circle::LensCircle;
 use super::picture::Picture;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::statistics::{Estimate, median};
@@ -97,8 +98,8 @@ pub(super) struct CellLevel {
 struct Sum {
     /// Number of samples.
     samples: f64,
-    /// Their distances from the frame's centre over that of the edge of the field, squared.
-    off_centre_sq: f64,
+    /// Their distances from the lens's axis over that of the edge of the field, squared.
+    off_axis_sq: f64,
     /// Their light, in ADU.
     light_adu: f64,
     /// The same behind the two filters that tell the color.
@@ -132,8 +133,8 @@ struct LitPlace {
     zenith_weight: f64,
     /// Level of the sky, in ADU.
     level_adu: f64,
-    /// Distance from the frame's centre over that of the edge of the field, squared.
-    off_centre_sq: f64,
+    /// Distance from the lens's axis over that of the edge of the field, squared.
+    off_axis_sq: f64,
     /// Solid angle of a pixel, in steradians, times the part of its light that the lens is known to let through.
     pixel_sr: f64,
 }
@@ -163,10 +164,9 @@ impl Levels {
     ) -> Self {
         /// Places at which the light is measured.
         const SAMPLES: f64 = 60_000.0;
-        let camera = grid.camera();
         let (width, height) = (picture.frame.width, picture.frame.height);
         let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
-        let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
+        let circle = LensCircle::of(grid.camera());
         let mesh_px = least_cell_px(frame.detections.spot_sigma_px).min(MOST_MESH_PX);
         let background = BackgroundMap::measure(picture.frame, mesh_px as usize);
         let dark_adu = dark.map_or(0.0, |dark| dark.adu.value);
@@ -211,7 +211,7 @@ impl Levels {
                     cell,
                     zenith_weight: if is_by_moon(&direction) { 0.0 } else { weight },
                     level_adu: f64::from(background_row[x]),
-                    off_centre_sq: camera.off_centre_sq(&pixel) / edge_sq,
+                    off_axis_sq: circle.off_axis_sq(&pixel),
                     pixel_sr: pixel_sr * frame.lens_transmission(&pixel),
                 };
                 let sample = Sum {
@@ -313,10 +313,8 @@ impl Levels {
         }
         let color_index = self.color_index.as_ref();
         let bv_mag = color_index.and_then(|index| index.of_sky(light.filters_adu));
-        let zero_point = clear_sky.for_sky(
-            bv_mag.unwrap_or(USUAL_SKY_BV_MAG),
-            light.mean_off_centre_sq(),
-        );
+        let zero_point =
+            clear_sky.for_sky(bv_mag.unwrap_or(USUAL_SKY_BV_MAG), light.mean_off_axis_sq());
         let mag = zero_point.value + instrumental_mag(flux_adu_s);
         let by_dark = light.samples * dark_sigma_adu / light.light_adu;
         Some(SkyLight {
@@ -335,10 +333,10 @@ impl LitPlace {
     fn sample(&self, light_adu: f64, clear_sky: &ClearSky) -> Sum {
         Sum {
             samples: 1.0,
-            off_centre_sq: self.off_centre_sq,
+            off_axis_sq: self.off_axis_sq,
             light_adu,
             filters_adu: [0.0; 2],
-            solid_angle_sr: self.pixel_sr * clear_sky.transmission(self.off_centre_sq),
+            solid_angle_sr: self.pixel_sr * clear_sky.transmission(self.off_axis_sq),
         }
     }
 }
@@ -356,20 +354,20 @@ impl ZenithSky {
 }
 
 impl CellLevel {
-    /// Mean distance from the frame's centre over that of the edge of the field, squared.
-    pub(super) fn off_centre_sq(&self) -> f64 {
-        self.light.mean_off_centre_sq()
+    /// Mean distance from the lens's axis over that of the edge of the field, squared.
+    pub(super) fn off_axis_sq(&self) -> f64 {
+        self.light.mean_off_axis_sq()
     }
 }
 
 impl Sum {
-    fn mean_off_centre_sq(&self) -> f64 {
-        self.off_centre_sq / self.samples
+    fn mean_off_axis_sq(&self) -> f64 {
+        self.off_axis_sq / self.samples
     }
 
     fn add(&mut self, weight: f64, sample: &Self) {
         self.samples += weight * sample.samples;
-        self.off_centre_sq += weight * sample.off_centre_sq;
+        self.off_axis_sq += weight * sample.off_axis_sq;
         self.light_adu += weight * sample.light_adu;
         self.solid_angle_sr += weight * sample.solid_angle_sr;
         for (sum, light_adu) in self.filters_adu.iter_mut().zip(sample.filters_adu) {

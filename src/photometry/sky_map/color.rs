@@ -35,7 +35,7 @@ impl ColorIndex {
                 bv_mag: Some(star.bv_mag? + REDDENING_MAG * star.airmass.unwrap_or(0.0)),
                 instrumental_mag: star.v_mag - ratio_mag(fluxes_adu)?,
                 sigma_mag,
-                off_centre_sq: star.off_centre_sq,
+                off_centre_sq: star.off_axis_sq,
             })
         };
         let stars: Vec<StandardStar> = stars.iter().filter_map(standard).collect();

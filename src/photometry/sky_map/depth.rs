@@ -8,7 +8,7 @@ use crate::photometry::instrumental_mag;
 pub(super) fn depths(levels: &Levels, clear_sky: &ClearSky) -> Vec<Option<f64>> {
     let depth = |cell: &CellLevel| {
         let limit_mag = instrumental_mag(cell.limit_adu / levels.exposure_s);
-        let depth_vmag = clear_sky.v_mag(cell.airmass, cell.off_centre_sq(), limit_mag);
+        let depth_vmag = clear_sky.v_mag(cell.airmass, cell.off_axis_sq(), limit_mag);
         depth_vmag.is_finite().then_some(depth_vmag)
     };
     levels.cells.iter().map(depth).collect()

@@ -195,6 +195,15 @@ impl<'a> Grid<'a> {
             .is_some_and(|distance_sq| distance_sq < reach_rad * reach_rad)
     }
 
+    /// The cells whose centres are so near that of a cell, in reaches of a cell; itself, too.
+    pub(super) fn cells_near(&self, cell: usize, reaches: f64) -> impl Iterator<Item = usize> {
+        let centers = self.centers.iter().enumerate();
+        centers.filter_map(move |(other, center)| {
+            self.is_near(cell, center.as_ref()?, reaches)
+                .then_some(other)
+        })
+    }
+
     fn distance_sq(&self, cell: usize, direction: &UnitVector<Icrs>) -> Option<f64> {
         Some(2.0 - 2.0 * self.centers[cell]?.dot(direction))
     }

@@ -59,7 +59,7 @@ pub(super) fn limits(
         };
         let over = over_depth.and_then(|expected| {
             let alike = |other: usize| is_clear(other) == is_clear(cell);
-            measured_over_depth(sky, witnesses, cell, expected, alike)
+            measured_over_depth(sky, (witnesses, clouds), cell, expected, alike)
         });
         CellLimits {
             expected_vmag: over_depth.map(|over| over + depth_vmag),
@@ -73,11 +73,11 @@ pub(super) fn limits(
 }
 
 /// The limit of the stars around a cell, over the threshold; `expected` is that of a clear sky. Stars that are
-/// not near are those of cells that are `alike`: clear, or behind clouds. `None` where the sky has too few stars,
-/// or clouds hide them.
+/// not near are those of cells that are `alike`: clear, or behind clouds. Each counts as it would behind the
+/// clouds of the cell. `None` where the sky has too few stars, or clouds hide them, or no star tells of the clouds.
 fn measured_over_depth(
     sky: &Sky,
-    witnesses: &[Witness],
+    (witnesses, clouds): (&[Witness], &[CellClouds]),
     cell: usize,
     expected: f64,
     alike: impl Fn(usize) -> bool,
@@ -87,13 +87,21 @@ fn measured_over_depth(
     /// Stars above the expected limit. A choice by those that are found would prefer cells in which chance
     /// shows more.
     const LEAST_BRIGHT: usize = 12;
+    /// Largest standard error.
+    const MOST_SIGMA_MAG: f64 = 0.5;
+    // Elsewhere stars tell nothing of the clouds here.
+    let here = clouds[cell].extinction_mag?;
     let near = |reach: f64| -> Vec<CountedStar> {
         let near = witnesses.iter().filter(|witness| {
             let is_near = sky.grid.is_near(cell, &witness.star.direction, reach);
             is_near && (reach == 1.0 || alike(witness.cell))
         });
-        near.map(|witness| witness.counted(witness.relative_mag))
-            .collect()
+        let moved = |witness: &Witness| {
+            let there = clouds[witness.cell].extinction_mag;
+            let more_mag = there.map_or(0.0, |there| there.value - here.value);
+            witness.counted(witness.relative_mag + more_mag)
+        };
+        near.map(moved).collect()
     };
     let is_enough = |stars: &Vec<CountedStar>| {
         let bright = stars.iter().filter(|star| star.v_mag < expected);
@@ -101,8 +109,9 @@ fn measured_over_depth(
     };
     let stars = REACHES.into_iter().map(near).find(is_enough)?;
     let limit = completeness::measure(&stars, sky.chance).limit.ok()?;
-    Some(Estimate {
+    let sigma = libm::hypot(limit.sigma_mag, here.sigma);
+    (sigma < MOST_SIGMA_MAG).then_some(Estimate {
         value: limit.v_mag,
-        sigma: limit.sigma_mag,
+        sigma,
     })
 }

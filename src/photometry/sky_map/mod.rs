@@ -27,7 +27,9 @@ mod color;
 mod dark_level;
 mod depth;
 mod grid;
+mod lens_circle;
 mod limits;
+mod neighbor;
 mod picture;
 mod relative_limit;
 mod stars;
@@ -101,6 +103,11 @@ pub struct SkyCell {
     pub extinction_mag: Option<Estimate>,
     /// Probability that this is below [`CLEAR_MAG`].
     pub clear: Option<f64>,
+    /// The same if clouds are smooth, and if they are broken: the clouds' texture decides in between.
+    pub clear_band: Option<[f64; 2]>,
+    /// Flux at which half of the stars are detected, in ADU, without what the lens is known to take.
+    #[doc(hidden)]
+    pub threshold_adu: f64,
     /// V magnitude at which half of the stars should be detected, without clouds.
     pub expected_limit_vmag: Option<f64>,
     /// V magnitude at which half of the stars around it are detected.
@@ -187,6 +194,8 @@ pub fn measure(
         detected: clouds[cell].detected,
         extinction_mag: clouds[cell].extinction_mag,
         clear: clouds[cell].clear,
+        clear_band: clouds[cell].clear_band,
+        threshold_adu: levels.cells[cell].limit_adu,
         expected_limit_vmag: limits[cell].expected_vmag,
         limit_vmag: limits[cell].measured_vmag,
     });

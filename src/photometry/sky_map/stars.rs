@@ -1,5 +1,6 @@
 //! The stars by which the sky is measured.
 
+use super::lens_circle::LensCircle;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::identify::{IndexedCatalog, PredictedStar};
 use crate::photometry::association::Association;
@@ -18,8 +19,8 @@ pub(super) struct SkyStar {
     pub bv_mag: Option<f64>,
     /// Airmass of its light, where the horizon is known.
     pub airmass: Option<f64>,
-    /// Distance from the frame's centre over that of the edge of the field, squared.
-    pub off_centre_sq: f64,
+    /// Distance from the lens's axis over that of the edge of the field, squared.
+    pub off_axis_sq: f64,
     /// By how much its undetected neighbors make it brighter, in magnitudes.
     pub brighter_mag: f64,
     /// Whether it was detected.
@@ -39,14 +40,13 @@ pub(super) fn of(
 ) -> Vec<SkyStar> {
     let found = frame.identification;
     let camera = &found.camera;
-    let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
+    let circle = LensCircle::of(camera);
     let inside = predicted.iter().filter(|star| camera.contains(&star.pixel));
     let both = association.stars.iter().zip(inside);
     let clear = both.filter(|(star, _)| star.is_clear);
     clear
         .map(|(star, predicted)| {
             let known = catalog.catalog().star(star.star);
-            let off_centre_sq = camera.off_centre_sq(&predicted.pixel);
             let detection = star.detection.map(|index| &frame.detections.sources[index]);
             let clean = detection.filter(|detection| {
                 detection.flags.has_clean_flux() && known.flags.is_constant_and_single()
@@ -61,7 +61,7 @@ pub(super) fn of(
                 v_mag: star.v_mag,
                 bv_mag: known.bv_mag.map(f64::from),
                 airmass: frame.places.airmass(&direction),
-                off_centre_sq: off_centre_sq / edge_sq,
+                off_axis_sq: circle.off_axis_sq(&predicted.pixel),
                 brighter_mag: star.brighter_mag(),
                 is_detected: detection.is_some(),
                 seen_at: detection.map(|detection| detection.position),

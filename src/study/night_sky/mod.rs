@@ -67,7 +67,8 @@ impl SkyStudy<'_> {
         let (frame, _) = simulator.frame(&pointing, conditions.seed)?;
         let context = self.context(&conditions, &setup);
         let solution = solve_frame(&frame, &context, workspace)?;
-        let truth = Truth::new(&simulator, &pointing, &conditions, self.site);
+        let spot_sigma_px = setup.scenario.camera.spot_sigma_px;
+        let truth = Truth::new(&simulator, &pointing, &conditions, self.site, spot_sigma_px);
         Ok(SkyTrial::new(number, &conditions, &solution, &truth))
     }
 

@@ -39,8 +39,58 @@ const GROUPS: [(&str, Belongs); 12] = [
 pub struct SkySummary {
     /// Errors in groups of frames; the first is that of all.
     pub groups: Vec<GroupRow>,
+    /// Errors of cells, in groups of them.
+    pub cells: Vec<CellGroup>,
     /// What the probability of a clear sky is worth.
     pub clear: Vec<ClearTenth>,
+}
+
+/// Whether a cell of a frame belongs to a group.
+type CellBelongs = fn(&FrameRow, &CellRow) -> bool;
+
+/// Groups of cells by name.
+const CELL_GROUPS: [(&str, CellBelongs); 8] = [
+    ("all", |_, _| true),
+    ("10 to 20°", |_, cell| cell.altitude_deg < 20.0),
+    ("20 to 40°", |_, cell| {
+        (20.0..40.0).contains(&cell.altitude_deg)
+    }),
+    ("above 40°", |_, cell| cell.altitude_deg >= 40.0),
+    ("no clouds", |frame, _| frame.cloud_mag == 0.0),
+    ("10 to 20°", |frame, cell| {
+        frame.cloud_mag == 0.0 && cell.altitude_deg < 20.0
+    }),
+    ("above 20°", |frame, cell| {
+        frame.cloud_mag == 0.0 && cell.altitude_deg >= 20.0
+    }),
+    ("clouds", |frame, _| frame.cloud_mag > 0.0),
+];
+
+/// Errors in a group of cells, measured less true.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellGroup {
+    /// Its name.
+    pub group: &'static str,
+    /// Number of cells.
+    pub cells: usize,
+    /// Mean error of the brightness, in magnitudes.
+    pub brightness_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub brightness_sd_mag: Option<f64>,
+    /// Its pull.
+    pub brightness_pull: Option<f64>,
+    /// The same of the extinction by clouds.
+    pub clouds_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub clouds_sd_mag: Option<f64>,
+    /// Its pull.
+    pub clouds_pull: Option<f64>,
+    /// The same of the limit.
+    pub limit_mean_mag: Option<f64>,
+    /// Its standard deviation.
+    pub limit_sd_mag: Option<f64>,
+    /// Its pull.
+    pub limit_pull: Option<f64>,
 }
 
 /// Errors in a group of frames, measured less true; a pull is the root mean square of errors over stated
@@ -101,6 +151,10 @@ pub struct ClearTenth {
     pub cells: usize,
     /// Mean of their probabilities.
     pub mean_clear: f64,
+    /// Mean of the lower and of the upper ends of their bands.
+    pub mean_clear_low: f64,
+    /// Of the upper ones.
+    pub mean_clear_high: f64,
     /// Share of the cells with less than 0.2 mag.
     pub share_clear: f64,
 }
@@ -114,6 +168,10 @@ impl SkySummary {
         });
         Self {
             groups: rows.collect(),
+            cells: CELL_GROUPS
+                .iter()
+                .map(|(group, belongs)| CellGroup::of(group, trials, *belongs))
+                .collect(),
             clear: (0..TENTHS)
                 .filter_map(|tenth| ClearTenth::of(tenth, trials))
                 .collect(),
@@ -164,6 +222,43 @@ impl GroupRow {
             cloud_share_rms: share.rms(),
             cloud_share_pull: share.pull(),
             clouds_area: area_under_curve(cells()),
+        }
+    }
+}
+
+impl CellGroup {
+    fn of(group: &'static str, trials: &[SkyTrial], belongs: CellBelongs) -> Self {
+        let cells: Vec<&CellRow> = trials
+            .iter()
+            .flat_map(|trial| {
+                let inside = move |cell: &&CellRow| belongs(&trial.frame, cell);
+                trial.cells.iter().filter(inside)
+            })
+            .collect();
+        let brightness = Errors::of(cells.iter().map(|cell| {
+            let error = cell.mag_arcsec2? - cell.true_mag_arcsec2;
+            Some((error, cell.sigma_mag?))
+        }));
+        let clouds = Errors::of(cells.iter().map(|cell| {
+            let error = cell.clouds_mag? - cell.true_clouds_mag;
+            Some((error, cell.clouds_sigma_mag?))
+        }));
+        let limit = Errors::of(cells.iter().map(|cell| {
+            let error = cell.limit_vmag? - cell.true_limit_vmag?;
+            Some((error, cell.limit_sigma_mag?))
+        }));
+        Self {
+            group,
+            cells: cells.len(),
+            brightness_mean_mag: brightness.mean(),
+            brightness_sd_mag: brightness.sd(),
+            brightness_pull: brightness.pull(),
+            clouds_mean_mag: clouds.mean(),
+            clouds_sd_mag: clouds.sd(),
+            clouds_pull: clouds.pull(),
+            limit_mean_mag: limit.mean(),
+            limit_sd_mag: limit.sd(),
+            limit_pull: limit.pull(),
         }
     }
 }
@@ -232,19 +327,25 @@ fn area_under_curve<'a>(cells: impl Iterator<Item = &'a CellRow>) -> Option<f64>
 impl ClearTenth {
     fn of(tenth: usize, trials: &[SkyTrial]) -> Option<Self> {
         let cells = trials.iter().flat_map(|trial| &trial.cells);
-        let told = cells.filter_map(|cell| Some((cell.clear?, cell.true_clouds_mag)));
-        let is_inside =
-            |(clear, _): &(f64, f64)| ((clear * TENTHS as f64) as usize).min(TENTHS - 1) == tenth;
-        let inside: Vec<(f64, f64)> = told.filter(is_inside).collect();
+        let told = cells.filter_map(|cell| Some((cell.clear?, cell)));
+        let is_inside = |(clear, _): &(f64, &CellRow)| {
+            ((clear * TENTHS as f64) as usize).min(TENTHS - 1) == tenth
+        };
+        let inside: Vec<(f64, &CellRow)> = told.filter(is_inside).collect();
         let cells = inside.len();
-        let mean = |of: fn(&(f64, f64)) -> f64| inside.iter().map(of).sum::<f64>() / cells as f64;
+        let mean = |of: &dyn Fn(f64, &CellRow) -> f64| {
+            let sum: f64 = inside.iter().map(|(clear, cell)| of(*clear, cell)).sum();
+            rounded(sum / cells as f64)
+        };
         let edge = |tenth: usize| tenth as f64 / TENTHS as f64;
         (cells > 0).then(|| Self {
             clear_from: edge(tenth),
             clear_to: edge(tenth + 1),
             cells,
-            mean_clear: rounded(mean(|(clear, _)| *clear)),
-            share_clear: rounded(mean(|(_, mag)| f64::from(*mag < CLEAR_MAG))),
+            mean_clear: mean(&|clear, _| clear),
+            mean_clear_low: mean(&|clear, cell| cell.clear_low.unwrap_or(clear)),
+            mean_clear_high: mean(&|clear, cell| cell.clear_high.unwrap_or(clear)),
+            share_clear: mean(&|_, cell| f64::from(cell.true_clouds_mag < CLEAR_MAG)),
         })
     }
 }
@@ -265,6 +366,11 @@ mod tests {
             clouds_mag: None,
             clouds_sigma_mag: None,
             clear: Some(clear),
+            clear_low: Some(clear),
+            clear_high: Some(clear),
+            true_limit_vmag: None,
+            limit_vmag: None,
+            limit_sigma_mag: None,
             limit_difference_mag: None,
         }
     }

@@ -1,6 +1,6 @@
 //! The summary as text for people.
 
-use super::summary::{ClearTenth, GroupRow, SkySummary};
+use super::summary::{CellGroup, ClearTenth, GroupRow, SkySummary};
 use std::fmt::Write as _;
 
 impl SkySummary {
@@ -27,8 +27,16 @@ impl SkySummary {
         }
         let _ = writeln!(
             text,
-            "\nProbability of a clear sky against the share of cells with less than 0.2 mag of clouds\n{:>12} {:>8} {:>8} {:>8}",
-            "", "cells", "mean", "share"
+            "\n{:<14} {:>8} {:>22} {:>22} {:>22}",
+            "cells", "", "brightness", "clouds", "limit"
+        );
+        for row in &self.cells {
+            text += &cell_line(row);
+        }
+        let _ = writeln!(
+            text,
+            "\nProbability of a clear sky against the share of cells with less than 0.2 mag of clouds\n{:>12} {:>8} {:>8} {:>14} {:>8}",
+            "", "cells", "mean", "band", "share"
         );
         for tenth in &self.clear {
             let ClearTenth {
@@ -36,25 +44,46 @@ impl SkySummary {
                 clear_to,
                 cells,
                 mean_clear,
+                mean_clear_low,
+                mean_clear_high,
                 share_clear,
             } = tenth;
             let _ = writeln!(
                 text,
-                "  {clear_from:.1} to {clear_to:.1} {cells:>8} {mean_clear:>8.3} {share_clear:>8.3}"
+                "  {clear_from:.1} to {clear_to:.1} {cells:>8} {mean_clear:>8.3}  {mean_clear_low:.3} to {mean_clear_high:.3} {share_clear:>8.3}"
             );
         }
         text
     }
 }
 
-fn line(row: &GroupRow) -> String {
-    let dash = || "–".to_owned();
-    let spread = |mean: Option<f64>, sd: Option<f64>, pull: Option<f64>| {
-        let (Some(mean), Some(sd), Some(pull)) = (mean, sd, pull) else {
-            return dash();
-        };
-        format!("{mean:+.3} ± {sd:.3}, {pull:.2}")
+fn dash() -> String {
+    "–".to_owned()
+}
+
+fn spread(mean: Option<f64>, sd: Option<f64>, pull: Option<f64>) -> String {
+    let (Some(mean), Some(sd), Some(pull)) = (mean, sd, pull) else {
+        return dash();
     };
+    format!("{mean:+.3} ± {sd:.3}, {pull:.2}")
+}
+
+fn cell_line(row: &CellGroup) -> String {
+    format!(
+        "{:<14} {:>8} {:>22} {:>22} {:>22}\n",
+        row.group,
+        row.cells,
+        spread(
+            row.brightness_mean_mag,
+            row.brightness_sd_mag,
+            row.brightness_pull
+        ),
+        spread(row.clouds_mean_mag, row.clouds_sd_mag, row.clouds_pull),
+        spread(row.limit_mean_mag, row.limit_sd_mag, row.limit_pull),
+    )
+}
+
+fn line(row: &GroupRow) -> String {
     let rms = |rms: Option<f64>, pull: Option<f64>| match (rms, pull) {
         (Some(rms), Some(pull)) => format!("{rms:.3}, {pull:.2}"),
         _ => dash(),

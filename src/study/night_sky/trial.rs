@@ -72,6 +72,11 @@ pub struct CellRow {
     pub clouds_mag: Option<f64>,
     pub clouds_sigma_mag: Option<f64>,
     pub clear: Option<f64>,
+    pub clear_low: Option<f64>,
+    pub clear_high: Option<f64>,
+    pub true_limit_vmag: Option<f64>,
+    pub limit_vmag: Option<f64>,
+    pub limit_sigma_mag: Option<f64>,
     pub limit_difference_mag: Option<f64>,
 }
 
@@ -88,7 +93,7 @@ impl SkyTrial {
         let (mut behind_sr, mut known_sr) = (0.0, 0.0);
         let mut rows = Vec::new();
         for cell in cells {
-            let Some(drawn) = truth.cell(&cell.place) else {
+            let Some(drawn) = truth.cell(&cell.place, cell.threshold_adu) else {
                 continue;
             };
             if cell.clear.is_some() {
@@ -179,6 +184,11 @@ impl CellRow {
             clouds_mag: cell.extinction_mag.map(|mag| decimals(mag.value)),
             clouds_sigma_mag: cell.extinction_mag.map(|mag| decimals(mag.sigma)),
             clear: cell.clear.map(decimals),
+            clear_low: cell.clear_band.map(|[low, _]| decimals(low)),
+            clear_high: cell.clear_band.map(|[_, high]| decimals(high)),
+            true_limit_vmag: Some(decimals(drawn.limit_vmag)).filter(|mag| mag.is_finite()),
+            limit_vmag: cell.limit_vmag.map(|limit| decimals(limit.value)),
+            limit_sigma_mag: cell.limit_vmag.map(|limit| decimals(limit.sigma)),
             limit_difference_mag: limits.map(|(found, expected)| decimals(found.value - expected)),
         })
     }

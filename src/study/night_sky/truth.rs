@@ -2,9 +2,12 @@
 
 use super::conditions::Conditions;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
+use crate::base::statistics::normal_cdf;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::detect::PIXEL_VARIANCE_PX2;
 use crate::identify::Identification;
 use crate::model::simulate::{Pointing, Simulator, TrueSky};
+use crate::photometry::filter_response;
 use crate::photometry::sky_map::{CLEAR_MAG, MOON_REACH_DEG, Place};
 use crate::sky::observer::Site;
 use crate::study::robustness::Answer;
@@ -23,6 +26,33 @@ pub(super) struct Truth<'a> {
     pointing: &'a Pointing,
     /// Where the Moon is, if it is above the horizon.
     moon: Option<UnitVector<Camera>>,
+    /// Standard deviation of a spot, in pixels.
+    spot_sigma_px: f64,
+    /// Electrons of a gray level.
+    gain_e_per_adu: f64,
+    /// Whether the loss of the lens is known where thresholds are stated.
+    lens_is_known: bool,
+}
+
+/// The magnitude at which half of the stars are detected, where they have these limits, each as likely.
+fn half_detected(limits: &[f64]) -> f64 {
+    /// Width of the fall at one limit.
+    const WIDTH_MAG: f64 = 0.3;
+    const ROUNDS: usize = 30;
+    let [mut bright, mut faint] = [f64::INFINITY, f64::NEG_INFINITY];
+    for limit in limits {
+        (bright, faint) = (bright.min(*limit), faint.max(*limit));
+    }
+    for _ in 0..ROUNDS {
+        let middle = 0.5 * (bright + faint);
+        let of = |limit: &f64| normal_cdf((limit - middle) / WIDTH_MAG);
+        if limits.iter().map(of).sum::<f64>() > 0.5 * limits.len() as f64 {
+            bright = middle;
+        } else {
+            faint = middle;
+        }
+    }
+    0.5 * (bright + faint)
 }
 
 /// A cell of the sky that was drawn.
@@ -34,6 +64,8 @@ pub(super) struct TrueCell {
     pub clouds_mag: f64,
     /// Share of it that is behind clouds.
     pub cloud_share: f64,
+    /// V magnitude at which half of its stars are detected.
+    pub limit_vmag: f64,
 }
 
 impl<'a> Truth<'a> {
@@ -43,12 +75,16 @@ impl<'a> Truth<'a> {
         pointing: &'a Pointing,
         conditions: &Conditions,
         site: Site,
+        spot_sigma_px: f64,
     ) -> Self {
         Self {
+            spot_sigma_px,
             sky: simulator.true_sky(pointing, conditions.seed),
             simulator,
             pointing,
             moon: conditions.moon_direction(site),
+            gain_e_per_adu: conditions.gain_e_per_adu,
+            lens_is_known: conditions.bias_known,
         }
     }
 
@@ -71,8 +107,25 @@ impl<'a> Truth<'a> {
         camera.pixel_of(&icrs_to_camera.apply(&direction))
     }
 
-    /// The sky of a cell; `None` where the frame shows none of it, or the cell is of the frame.
-    pub(super) fn cell(&self, place: &Place) -> Option<TrueCell> {
+    /// V magnitude of a star that leaves the flux `threshold_adu` of the detection.
+    fn limit_vmag(&self, pixel: &PixelPoint, threshold_adu: f64) -> f64 {
+        let electrons = threshold_adu * self.gain_e_per_adu;
+        let lens = if self.lens_is_known {
+            self.sky.lens(pixel)
+        } else {
+            1.0
+        };
+        let transmission = self.sky.transmission(pixel) / lens;
+        // A star is off the center of its pixel, and less of it is in the filter.
+        let spot_px2 = self.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
+        let filtered = filter_response((2.0 * PIXEL_VARIANCE_PX2 / spot_px2).sqrt());
+        let electrons = electrons / transmission / filtered;
+        self.simulator.light().vmag_of(electrons)
+    }
+
+    /// The sky of a cell with the detection threshold `threshold_adu`; `None` where the frame shows none of it, or
+    /// the cell is of the frame.
+    pub(super) fn cell(&self, place: &Place, threshold_adu: f64) -> Option<TrueCell> {
         let Place::Horizon {
             altitude_deg,
             azimuth_deg,
@@ -89,6 +142,7 @@ impl<'a> Truth<'a> {
             mut clouded,
             mut weights,
         ] = [0.0; 4];
+        let mut limits = Vec::new();
         for step in 0..SAMPLES * SAMPLES {
             let altitude_deg = at(*altitude_deg, step / SAMPLES);
             let pixel = self.pixel_of(altitude_deg, at(*azimuth_deg, step % SAMPLES));
@@ -96,11 +150,13 @@ impl<'a> Truth<'a> {
                 Some((
                     self.sky.electrons_per_sr(&pixel)?,
                     self.sky.clouds_mag(&pixel),
+                    self.limit_vmag(&pixel, threshold_adu),
                 ))
             });
-            let Some((light, dimmed_mag)) = sky else {
+            let Some((light, dimmed_mag, limit_vmag)) = sky else {
                 continue;
             };
+            limits.push(limit_vmag);
             let weight = libm::cos(altitude_deg * RAD_PER_DEG);
             electrons_per_sr += weight * light;
             clouds_mag += weight * dimmed_mag;
@@ -111,6 +167,7 @@ impl<'a> Truth<'a> {
             mag_arcsec2: self.sky.mag_arcsec2(electrons_per_sr / weights),
             clouds_mag: clouds_mag / weights,
             cloud_share: clouded / weights,
+            limit_vmag: half_detected(&limits),
         })
     }
 

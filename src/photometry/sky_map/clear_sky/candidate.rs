@@ -2,8 +2,8 @@
 
 use super::relation::{Unknowns, row_of};
 use crate::base::coords::{Icrs, UnitVector};
-use crate::base::units::RAD_PER_DEG;
 use crate::photometry::Measured;
+use crate::photometry::sky_map::neighbor::neighbor;
 use crate::photometry::sky_map::stars::SkyStar;
 
 /// How much the extinction differs from one direction to another, in magnitudes per airmass: some percent
@@ -29,9 +29,10 @@ impl Candidate {
     pub fn all_of(stars: &[SkyStar], mean_vmag: f64) -> Vec<Self> {
         let of = |star| Self::of(star, mean_vmag);
         let mut all: Vec<Self> = stars.iter().filter_map(of).collect();
-        let neighbors: Vec<Option<usize>> = (0..all.len()).map(|one| neighbor(&all, one)).collect();
-        for (candidate, neighbor) in all.iter_mut().zip(neighbors) {
-            candidate.neighbor = neighbor;
+        let places = all.iter().map(|star| (star.direction, star.sigma_mag));
+        let places: Vec<_> = places.collect();
+        for (one, candidate) in all.iter_mut().enumerate() {
+            candidate.neighbor = neighbor(&places, one);
         }
         all
     }
@@ -44,7 +45,7 @@ impl Candidate {
         Some(Self {
             row: Unknowns::from(row_of(
                 star.airmass,
-                star.off_centre_sq,
+                star.off_axis_sq,
                 star.bv_mag,
                 star.v_mag - mean_vmag,
             )),
@@ -71,21 +72,4 @@ impl Candidate {
     pub fn counts(&self, unknowns: &Unknowns, largest_mag: f64) -> bool {
         self.expected_sigma_mag(unknowns) < largest_mag
     }
-}
-
-/// The candidate next to `one`, if it is near: of those that are about as well measured, or better.
-fn neighbor(all: &[Candidate], one: usize) -> Option<usize> {
-    const NEAR_DEG: f64 = 6.0;
-    /// Largest error of the other star, over its own.
-    const MOST: f64 = 2.0;
-    let Candidate {
-        direction,
-        sigma_mag,
-        ..
-    } = &all[one];
-    let is_other = |&other: &usize| other != one && all[other].sigma_mag < MOST * sigma_mag;
-    let cosine = |other: usize| (all[other].direction.dot(direction), other);
-    let others = (0..all.len()).filter(is_other).map(cosine);
-    let (cosine, nearest) = others.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (cosine > libm::cos(NEAR_DEG * RAD_PER_DEG)).then_some(nearest)
 }

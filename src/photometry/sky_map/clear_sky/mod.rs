@@ -4,7 +4,7 @@
 //! V = Z + m + c (B−V − 0.6) + q (B−V − 0.6)² − k X − a ρ² − b ρ⁴ + s (V − V̄)
 //! ```
 //!
-//! X is the airmass, ρ the distance from the frame's centre, 1 at the edge of the field; s is 0 where gray
+//! X is the airmass, ρ the distance from the lens's axis, 1 at the edge of the field; s is 0 where gray
 //! levels are proportional to light, and V̄ is the mean of the stars. What is known of
 //! cameras and of air enters as measurements: where a frame tells more, it decides. Clouds only dim stars:
 //! a part of them is in clear air, and the others are dimmer by some extinctions.
@@ -152,12 +152,7 @@ impl ClearSky {
     /// The instrumental magnitude of a star in clear air.
     pub(super) fn instrumental_mag(&self, star: &SkyStar) -> f64 {
         let above_mean_mag = star.v_mag - self.mean_vmag;
-        let row = row_of(
-            star.airmass,
-            star.off_centre_sq,
-            star.bv_mag,
-            above_mean_mag,
-        );
+        let row = row_of(star.airmass, star.off_axis_sq, star.bv_mag, above_mean_mag);
         star.v_mag - self.dot(row)
     }
 
@@ -165,17 +160,23 @@ impl ClearSky {
     pub(super) fn v_mag(
         &self,
         airmass: Option<f64>,
-        off_centre_sq: f64,
+        off_axis_sq: f64,
         instrumental_mag: f64,
     ) -> f64 {
         let slope = self.fit.unknowns[SLOPE];
-        let row = row_of(airmass, off_centre_sq, None, -self.mean_vmag);
+        let row = row_of(airmass, off_axis_sq, None, -self.mean_vmag);
         (instrumental_mag + self.dot(row)) / (1.0 - slope)
     }
 
     /// By how many magnitudes a star of this instrumental magnitude would be dimmer than in clear air.
     pub(super) fn dimmer_mag(&self, star: &SkyStar, instrumental_mag: f64) -> f64 {
         (instrumental_mag - self.instrumental_mag(star)) / (1.0 - self.fit.unknowns[SLOPE])
+    }
+
+    /// The standard error of the magnitude that a star in clear air should have at a place.
+    pub(super) fn sigma_mag(&self, airmass: Option<f64>, off_axis_sq: f64) -> f64 {
+        let row = Unknowns::from(row_of(airmass, off_axis_sq, None, 0.0));
+        libm::hypot(self.fit.variance(&row).sqrt(), self.doubt_mag)
     }
 
     /// Whether gray levels have a tone curve.
@@ -189,9 +190,9 @@ impl ClearSky {
 
     /// The zero point for the light of a sky of this color at the ground, with what the lens takes at a place
     /// given back; the error contains that of the color and of the lens.
-    pub(super) fn for_sky(&self, bv_mag: Estimate, off_centre_sq: f64) -> Estimate {
-        let row = |off_centre_sq| row_of(None, off_centre_sq, Some(bv_mag.value), 0.0);
-        let at_place = Unknowns::from(row(off_centre_sq));
+    pub(super) fn for_sky(&self, bv_mag: Estimate, off_axis_sq: f64) -> Estimate {
+        let row = |off_axis_sq| row_of(None, off_axis_sq, Some(bv_mag.value), 0.0);
+        let at_place = Unknowns::from(row(off_axis_sq));
         let variance = self.fit.variance(&at_place);
         let off_mag = bv_mag.value - REFERENCE_BV_MAG;
         let per_mag = self.fit.unknowns[COLOR] + 2.0 * self.fit.unknowns[COLOR_CURVE] * off_mag;
@@ -213,9 +214,9 @@ impl ClearSky {
     }
 
     /// What arrives at a place, over what arrives at the centre.
-    pub(super) fn transmission(&self, off_centre_sq: f64) -> f64 {
+    pub(super) fn transmission(&self, off_axis_sq: f64) -> f64 {
         let [a, b] = VIGNETTING.map(|unknown| self.fit.unknowns[unknown]);
-        let loss_mag = a * off_centre_sq + b * off_centre_sq * off_centre_sq;
+        let loss_mag = a * off_axis_sq + b * off_axis_sq * off_axis_sq;
         libm::pow(10.0, -0.4 * loss_mag)
     }
 }

@@ -45,7 +45,7 @@ pub(super) type Unknowns = SVector<f64, UNKNOWNS>;
 /// The derivatives of the relation by the unknowns.
 pub(super) fn row_of(
     airmass: Option<f64>,
-    off_centre_sq: f64,
+    off_axis_sq: f64,
     bv_mag: Option<f64>,
     above_mean_mag: f64,
 ) -> [f64; UNKNOWNS] {
@@ -55,8 +55,8 @@ pub(super) fn row_of(
         off_mag,
         // Without a horizon the zero point is that of the ground.
         -airmass.unwrap_or(0.0),
-        -off_centre_sq,
-        -off_centre_sq * off_centre_sq,
+        -off_axis_sq,
+        -off_axis_sq * off_axis_sq,
         above_mean_mag,
         off_mag * off_mag,
     ]

@@ -1,6 +1,7 @@
 //! The light of the clear sky and of clouds, and which cells have it.
 
 use super::lit_cell::{Hidden, LitCell, STEPS, share_of};
+use super::per_share::{CloudyCell, PerShare};
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -18,6 +19,8 @@ pub(super) struct Fit {
     clear: DVector<f64>,
     /// Light that clouds add where they take all light of stars, over that of the clear sky.
     of_cloud: f64,
+    /// Its relative error.
+    of_cloud_sigma: f64,
     /// Scatter of the light of a cell, over that of the clear sky.
     sigma: f64,
     /// Part of the cells that is not clear.
@@ -57,6 +60,7 @@ impl Fit {
         let mut fit = Self {
             clear,
             of_cloud: 0.0,
+            of_cloud_sigma: 0.0,
             sigma: f64::INFINITY,
             clouded,
         };
@@ -89,9 +93,27 @@ impl Fit {
 
     /// The likelihood of the light of a cell if clouds take this share of a star's light.
     pub(super) fn likelihood(&self, excess: f64, share: f64) -> f64 {
-        let off = (excess - self.of_cloud * share) / self.sigma;
-        let agrees = libm::exp(-0.5 * off * off) / (self.sigma * TAU.sqrt());
+        let cloud = self.of_cloud * share;
+        let sigma = libm::hypot(self.sigma, self.of_cloud_sigma * cloud);
+        let off = (excess - cloud) / sigma;
+        let agrees = libm::exp(-0.5 * off * off) / (sigma * TAU.sqrt());
         (1.0 - UNTRUE) * agrees + UNTRUE / UNTRUE_RANGE
+    }
+
+    /// Sets how much light clouds add to what the stars of `cells` tell, and its error.
+    pub(super) fn set_light_by_stars(&mut self, cells: &[LitCell]) {
+        /// Cells with more than this many standard deviations of light have clouds.
+        const SIGMAS: f64 = 2.0;
+        /// How clouds differ in the light that they add: by height, thickness, and what lights them.
+        const DIFFERS: f64 = 0.15;
+        let sigma = self.sigma / self.of_cloud.abs();
+        let cloudy = cells.iter().filter_map(|lit| {
+            let share = self.excess(lit) / self.of_cloud;
+            (share > SIGMAS * sigma).then_some(CloudyCell { share, sigma, lit })
+        });
+        let PerShare { ln_ratio, sigma } = PerShare::of(&cloudy.collect::<Vec<_>>());
+        self.of_cloud *= libm::exp(ln_ratio);
+        self.of_cloud_sigma = libm::hypot(sigma, DIFFERS);
     }
 
     /// The probability that light tells something, by its likelihood.
@@ -179,6 +201,7 @@ impl Fit {
         let mut next = Self {
             clear: solved.rows(0, terms).into_owned(),
             of_cloud: solved[terms],
+            of_cloud_sigma: 0.0,
             sigma: LEAST_SIGMA,
             clouded: (BEFOREHAND + cloudy) / (2.0 * BEFOREHAND + count),
         };

@@ -37,6 +37,11 @@ pub(super) fn share_of(step: usize) -> f64 {
     step as f64 / STEPS as f64
 }
 
+/// A value for the share of each step.
+pub(in crate::photometry::sky_map) fn for_each_share(of: impl Fn(f64) -> f64) -> [f64; STEPS + 1] {
+    std::array::from_fn(|step| of(share_of(step)))
+}
+
 /// A cell of which stars tell, and its light.
 #[derive(Debug, Clone)]
 pub(in crate::photometry::sky_map) struct LitCell {
@@ -44,6 +49,8 @@ pub(in crate::photometry::sky_map) struct LitCell {
     pub cell: usize,
     /// What its stars tell.
     pub hidden: Hidden,
+    /// What its stars alone tell: the likelihood of each step of the share.
+    pub by_stars: [f64; STEPS + 1],
     /// Its light over its solid angle, in any unit.
     pub light: f64,
     /// Terms of which the light of a clear sky is composed.

@@ -6,17 +6,20 @@
 //!    of it for the share of a star's light that they take.
 //! 2. What the stars tell of the cells gives a first value of that share, and expectation and maximization
 //!    the rest: how likely each cell's light is for each cloud, then the light of the clear sky and of clouds.
-//! 3. Light counts only if it foretells which stars are seen: what else is bright does not.
+//! 3. How much light clouds add for what they take is told by the stars alone, with its error
+//!    ([`per_share`]).
+//! 4. Light counts only if it foretells which stars are seen: what else is bright does not.
 //!
 //! Then light tells of cells that have few stars.
 
 mod fit;
 mod lit_cell;
+mod per_share;
 mod terms;
 
 use super::grid::CELLS_OF_A_STAR;
 use fit::Fit;
-pub(super) use lit_cell::{Hidden, LitCell};
+pub(super) use lit_cell::{Hidden, LitCell, for_each_share};
 pub(super) use terms::terms;
 
 /// The light of cells that tells of clouds.
@@ -32,7 +35,7 @@ impl CloudLight {
     pub(super) fn of(mut cells: Vec<LitCell>, before: &Hidden, clouded: f64) -> Option<Self> {
         /// What chance may give of the gain of [`Fit::gains`].
         const LEAST_GAIN: f64 = 6.0;
-        let fit = Fit::of(&mut cells, clouded)?;
+        let mut fit = Fit::of(&mut cells, clouded)?;
         let gains = cells
             .iter()
             .map(|lit| fit.gains(lit, before, clouded))
@@ -44,6 +47,7 @@ impl CloudLight {
         if !gains.into_iter().all(is_told) {
             return None;
         }
+        fit.set_light_by_stars(&cells);
         let count = cells.iter().map(|lit| lit.cell + 1).max()?;
         let mut excess = vec![None; count];
         for lit in &cells {
@@ -100,6 +104,7 @@ mod tests {
                 }
                 LitCell {
                     cell,
+                    by_stars: std::array::from_fn(|step| hidden.clear[step] + hidden.cloud[step]),
                     hidden,
                     light: clear * (1.0 + added),
                     terms: vec![1.0, along],

@@ -5,17 +5,22 @@
 //! A part of the sky has the extinction of clear air alone, and the other part more. How large that part is,
 //! and how thick its clouds are on average, is told by all cells together.
 
-use super::cases::{CASES, CLEAR_MAG, Cases, HALF_STEP_MAG, STEP_MAG, STEPS, half_mag, mean_mag};
+use super::cases::{
+    BROKEN_STEP_MAG, CASES, CLEAR_MAG, Case, Cases, KINDS, STEP_MAG, STEPS, case, mean_mag,
+};
 use crate::base::statistics::Estimate;
 use crate::photometry::sky_map::cloud_light::Hidden;
 use crate::photometry::sky_map::grid::CELLS_OF_A_STAR;
 
 /// Mean extinctions of clouds, in magnitudes, of which the likeliest counts: haze, usual clouds, thick ones.
 const MEAN_CLOUDS_MAG: [f64; 3] = [0.3, 1.0, 3.0];
-/// Cells that clouds cover by half, for each that they cover.
-const HALVES: f64 = 0.3;
+/// Cells that clouds cover, by half and by a quarter, for each that they cover: most clouds are larger than a cell.
+const USUAL: [f64; KINDS] = [1.0, 0.3, 0.0];
+/// The same where all clouds are smooth, and where they are broken.
+const SMOOTH: [f64; KINDS] = [1.0, 0.0, 0.0];
+const BROKEN: [f64; KINDS] = [1.0, 1.0, 2.0];
 /// Variation of clear air, in magnitudes.
-const CLEAR_SIGMA_MAG: f64 = 0.05;
+pub(super) const CLEAR_SIGMA_MAG: f64 = 0.05;
 /// No cell is more certain of clouds, or of a clear sky, than by this factor.
 const MOST_ODDS: f64 = 1000.0;
 
@@ -44,6 +49,15 @@ impl Told {
         }
     }
 
+    /// The likelihood of what its stars show behind an even cloud that takes a share of their light.
+    pub(super) fn likelihood_of(&self, share: f64) -> f64 {
+        const THICKEST: f64 = (STEPS - 1) as f64;
+        let mag = -2.5 * libm::log10(1.0 - share);
+        let case = (mag / STEP_MAG).min(THICKEST);
+        let [below, above] = [case.floor(), case.ceil()].map(|at| self.likelihoods[at as usize]);
+        below + case.fract() * (above - below)
+    }
+
     /// Adds what else tells of it, by the share of a star's light that clouds take; `hidden_shares` are those of
     /// the cases.
     pub(super) fn add(&mut self, hidden_shares: &Cases, likelihood: impl Fn(f64) -> f64) {
@@ -63,18 +77,18 @@ impl Told {
 #[derive(Debug, Clone)]
 pub(super) struct Belief {
     priors: Priors,
+    /// Those where clouds are smooth, and where they are broken.
+    limiting: [Priors; 2],
     /// Of each cell.
     evidence: Vec<Evidence>,
     /// Part of the sky that is not clear.
     pub clouded: f64,
-    /// Error of that.
-    sigma: f64,
 }
 
 impl Belief {
     /// With the mean extinction of clouds that is likeliest.
     pub(super) fn of(told: &[Told]) -> Self {
-        let beliefs = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(told, Priors::new(mean_mag)));
+        let beliefs = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(told, mean_mag));
         let [first, rest @ ..] = beliefs;
         let likelier = |best: Self, other: Self| {
             if other.ln_likelihood() > best.ln_likelihood() {
@@ -87,11 +101,15 @@ impl Belief {
     }
 
     /// The part that is clouded is the one for which what the cells show is most probable.
-    fn with(told: &[Told], priors: Priors) -> Self {
+    fn with(told: &[Told], mean_cloud_mag: f64) -> Self {
         const STEPS: usize = 200;
         /// Cells that are clear, and that are not, which the sky has beforehand.
         const BEFOREHAND: f64 = 0.5;
-        let evidence: Vec<Evidence> = told.iter().map(|told| priors.evidence(told)).collect();
+        let priors = Priors::new(mean_cloud_mag, &USUAL);
+        let evidence: Vec<Evidence> = told
+            .iter()
+            .map(|told| priors.evidence(told, CLEAR_MAG))
+            .collect();
         let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
         // The same stars tell of several cells.
         let cells = told.len() as f64 / CELLS_OF_A_STAR;
@@ -106,12 +124,11 @@ impl Belief {
             let share = if told.is_empty() { 0.5 } else { share };
             clouded = (BEFOREHAND + cells * share) / (2.0 * BEFOREHAND + cells);
         }
-        let information = mean(&|of| ((of.cloud.all - of.clear.all) / of.mixed(clouded)).powi(2));
         Self {
             priors,
+            limiting: [SMOOTH, BROKEN].map(|covers| Priors::new(mean_cloud_mag, &covers)),
             evidence,
             clouded,
-            sigma: (cells * information).sqrt().recip().min(0.5),
         }
     }
 
@@ -136,17 +153,40 @@ impl Belief {
         self.evidence.iter().map(posterior)
     }
 
-    /// Share of the sky of which stars tell that is behind clouds.
-    pub(super) fn share(&self, told: &[Told]) -> Option<Estimate> {
-        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
-        let clouded_sr = told.iter().zip(self.cells());
-        let clouded_sr = clouded_sr.map(|(told, (clear, _))| told.solid_angle_sr * (1.0 - clear));
-        let clouded_sr: f64 = clouded_sr.sum();
-        (all_sr > 0.0).then(|| Estimate {
-            value: clouded_sr / all_sr,
-            sigma: self.sigma,
-        })
+    /// The probability of a cell that it is clear where clouds are smooth and thicker by `doubt_mag`, and where they
+    /// are broken and thinner by that.
+    pub(super) fn clear_band(&self, told: &Told, doubt_mag: f64) -> [f64; 2] {
+        let clear = |priors: &Priors, clear_mag: f64| {
+            let (clear, _) = priors.evidence(told, clear_mag).posterior(self.clouded);
+            clear
+        };
+        let [smooth, broken] = &self.limiting;
+        [
+            clear(smooth, CLEAR_MAG - doubt_mag),
+            clear(broken, CLEAR_MAG + doubt_mag),
+        ]
     }
+}
+
+/// Share of the sky of which stars tell that is behind clouds, by the probabilities that cells are clear, with their
+/// bands.
+pub(super) fn cloud_share(told: &[Told], clear: impl Fn(&Told) -> [f64; 3]) -> Option<Estimate> {
+    /// The ends of all bands together, over the standard error that they are.
+    const BAND_SIGMAS: f64 = 2.0;
+    let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+    let [mut clouded, mut band, mut chance] = [0.0; 3];
+    for told in told {
+        let weight = told.solid_angle_sr / all_sr;
+        let [low, clear, high] = clear(told);
+        clouded += weight * (1.0 - clear);
+        band += weight * (high - low);
+        // The same stars tell of several cells.
+        chance += CELLS_OF_A_STAR * weight * weight * clear * (1.0 - clear);
+    }
+    (all_sr > 0.0).then(|| Estimate {
+        value: clouded,
+        sigma: libm::hypot(chance.sqrt(), band / BAND_SIGMAS),
+    })
 }
 
 /// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
@@ -157,16 +197,16 @@ struct Priors {
 }
 
 impl Priors {
-    /// Those of clouds with this mean extinction.
-    fn new(mean_cloud_mag: f64) -> Self {
+    /// Those of clouds with this mean extinction, and covers of cells.
+    fn new(mean_cloud_mag: f64, covers: &[f64; KINDS]) -> Self {
         let of_clear = |case: usize| match case {
             0..STEPS => libm::exp(-0.5 * (mean_mag(case) / CLEAR_SIGMA_MAG).powi(2)),
             _ => 0.0,
         };
-        // Most clouds are larger than a cell.
-        let of_cloud = |case: usize| match case.checked_sub(STEPS) {
-            None => STEP_MAG * libm::exp(-mean_mag(case) / mean_cloud_mag),
-            Some(step) => HALVES * HALF_STEP_MAG * libm::exp(-half_mag(step) / mean_cloud_mag),
+        let of_cloud = |number: usize| {
+            let Case { kind, mag, .. } = case(number);
+            let step_mag = [STEP_MAG, BROKEN_STEP_MAG, BROKEN_STEP_MAG][kind];
+            covers[kind] * step_mag * libm::exp(-mag / mean_cloud_mag)
         };
         let normalized = |prior: &dyn Fn(usize) -> f64| {
             let total: f64 = (0..CASES).map(prior).sum();
@@ -178,7 +218,8 @@ impl Priors {
         }
     }
 
-    fn evidence(&self, told: &Told) -> Evidence {
+    /// What is told of a cell, where less than `clear_mag` counts as clear.
+    fn evidence(&self, told: &Told, clear_mag: f64) -> Evidence {
         let sums = |prior: &Cases| {
             let mut sums = Sums::default();
             for (case, (likelihood, prior)) in told.likelihoods.iter().zip(prior).enumerate() {
@@ -186,7 +227,7 @@ impl Priors {
                 sums.all += weight;
                 sums.first += weight * mean_mag(case);
                 sums.second += weight * mean_mag(case).powi(2);
-                sums.below_clear += weight * f64::from(mean_mag(case) < CLEAR_MAG);
+                sums.below_clear += weight * f64::from(mean_mag(case) < clear_mag);
             }
             sums
         };
@@ -276,6 +317,33 @@ mod tests {
         Told::new(cell, 0.01, &logs)
     }
 
+    fn share_of(belief: &Belief, all: &[Told]) -> Option<Estimate> {
+        let clear: Vec<f64> = belief.cells().map(|(clear, _)| clear).collect();
+        let bands = all.iter().map(|told| belief.clear_band(told, 0.05));
+        let bands: Vec<[f64; 2]> = bands.collect();
+        cloud_share(all, |told| {
+            let at = all
+                .iter()
+                .position(|other| other.cell == told.cell)
+                .unwrap();
+            [bands[at][0], clear[at], bands[at][1]]
+        })
+    }
+
+    #[test]
+    fn broken_clouds_may_leave_a_cell_clear_that_smooth_ones_do_not() {
+        let cells: Vec<Told> = (0..100)
+            .map(|cell| told(cell, 0.2, if cell < 50 { 0.01 } else { 2.0 }))
+            .collect();
+        let belief = Belief::of(&cells);
+        for (told, (clear, _)) in cells.iter().zip(belief.cells()) {
+            let [low, high] = belief.clear_band(told, 0.05);
+            assert!(low <= clear && clear <= high, "{low} {clear} {high}");
+        }
+        let [low, high] = belief.clear_band(&cells[99], 0.05);
+        assert!(high - low > 0.2, "{low} {high}");
+    }
+
     #[test]
     fn all_cells_together_tell_how_much_is_clear() {
         let cells = |clear: usize, cloudy: usize| -> Vec<Told> {
@@ -286,15 +354,15 @@ mod tests {
         };
         let mostly_clear = cells(90, 10);
         let belief = Belief::of(&mostly_clear);
-        let share = belief.share(&mostly_clear).unwrap();
+        let share = share_of(&belief, &mostly_clear).unwrap();
         assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
         assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
         // The same cell is more likely clear where most of the sky is.
-        let doubtful = belief.priors.evidence(&told(0, 1.0, 10.0));
+        let doubtful = belief.priors.evidence(&told(0, 1.0, 10.0), CLEAR_MAG);
         let (clear, _) = doubtful.posterior(belief.clouded);
         let (less, _) = doubtful.posterior(Belief::of(&cells(10, 90)).clouded);
         assert!(clear > less + 0.3, "{clear} {less}");
-        assert_eq!(Belief::of(&[]).share(&[]), None);
+        assert_eq!(share_of(&Belief::of(&[]), &[]), None);
     }
 
     #[test]
@@ -306,9 +374,9 @@ mod tests {
                 .collect()
         };
         let thin = cells(0.4);
-        let share = Belief::of(&thin).share(&thin).unwrap();
+        let share = share_of(&Belief::of(&thin), &thin).unwrap();
         assert!((share.value - 0.33).abs() < 0.1, "{share:?}");
-        let usual = Belief::with(&thin, Priors::new(1.0));
-        assert!(usual.share(&thin).unwrap().value < share.value);
+        let usual = Belief::with(&thin, 1.0);
+        assert!(share_of(&usual, &thin).unwrap().value < share.value);
     }
 }

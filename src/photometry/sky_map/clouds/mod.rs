@@ -8,15 +8,17 @@
 
 mod belief;
 mod cases;
+mod texture;
 
 use super::brightness::Levels;
-use super::cloud_light::{CloudLight, Hidden, LitCell, terms};
+use super::cloud_light::{CloudLight, Hidden, LitCell, for_each_share, terms};
 use super::relative_limit::RelativeLimit;
 use super::witnesses::{Sky, Witness};
 use crate::base::statistics::Estimate;
-use belief::{Belief, Told};
+use belief::{Belief, CLEAR_SIGMA_MAG, Told, cloud_share};
 pub use cases::CLEAR_MAG;
-use cases::{CASES, Cases, STEP_MAG, STEPS, half_mag, hidden_shares};
+use cases::{CASES, Case, Cases, STEP_MAG, STEPS, hidden_shares};
+use texture::Texture;
 
 /// Variation of the extinction within a cell, over the extinction.
 const CLOUD_VARIATION: f64 = 0.3;
@@ -38,6 +40,16 @@ pub(super) struct CellClouds {
     pub extinction_mag: Option<Estimate>,
     /// Probability that it is below [`CLEAR_MAG`].
     pub clear: Option<f64>,
+    /// The same if clouds are smooth, and if they are broken.
+    pub clear_band: Option<[f64; 2]>,
+}
+
+/// What the stars around a cell tell of it.
+struct Around {
+    /// Logarithms of the likelihoods of the cases.
+    ln_likelihoods: Cases,
+    /// Stars with equal weights that would tell as much.
+    stars: f64,
 }
 
 /// Clouds in all cells.
@@ -62,12 +74,15 @@ impl Sky<'_> {
             .collect();
         let mut cells = vec![CellClouds::default(); self.grid.places.len()];
         let mut told = Vec::new();
+        let mut stars_of = vec![0.0; cells.len()];
         for (cell, (clouds, level)) in cells.iter_mut().zip(&levels.cells).enumerate() {
             let solid_angle_sr = level.solid_angle_sr;
             let stars = witnesses.iter().zip(&logs);
-            let logs = self.ln_likelihoods_around(cell, stars, limit.as_ref(), clouds);
-            let logs = logs.filter(|_| solid_angle_sr > 0.0);
-            told.extend(logs.map(|logs| Told::new(cell, solid_angle_sr, &logs)));
+            let around = self.around(cell, stars, limit.as_ref(), clouds);
+            if let Some(around) = around.filter(|_| solid_angle_sr > 0.0) {
+                stars_of[cell] = around.stars;
+                told.push(Told::new(cell, solid_angle_sr, &around.ln_likelihoods));
+            }
         }
         let mut belief = Belief::of(&told);
         let shares = hidden_shares();
@@ -86,23 +101,65 @@ impl Sky<'_> {
             cells[told.cell].clear = Some(clear);
             cells[told.cell].extinction_mag = Some(extinction_mag);
         }
+        let texture = Texture::of(self, witnesses);
+        let doubts_mag: Vec<f64> = told
+            .iter()
+            .map(|told| self.doubt_mag(told.cell, &cells, stars_of[told.cell], levels, &texture))
+            .collect();
+        for (told, doubt_mag) in told.iter().zip(doubts_mag) {
+            let clouds = &mut cells[told.cell];
+            if let Some(extinction_mag) = &mut clouds.extinction_mag {
+                extinction_mag.sigma = libm::hypot(extinction_mag.sigma, doubt_mag);
+            }
+            let [low, high] = belief.clear_band(told, libm::hypot(doubt_mag, CLEAR_SIGMA_MAG));
+            clouds.clear_band = clouds.clear.map(|clear| [low.min(clear), high.max(clear)]);
+        }
+        let bands = |told: &Told| {
+            let CellClouds {
+                clear, clear_band, ..
+            } = cells[told.cell];
+            let [low, high] = clear_band.unwrap_or([0.0, 1.0]);
+            [low, clear.unwrap_or(0.5), high]
+        };
         Clouds {
-            share: belief.share(&told),
+            share: cloud_share(&told, bands),
             cells,
         }
     }
 
-    /// The logarithms of the likelihoods of the stars around a cell, if they tell of it; the stars in it are counted
-    /// in `clouds`.
-    fn ln_likelihoods_around<'w>(
+    /// What the likelihoods of a cell leave out of the error of its extinction, in magnitudes: the error of clear air,
+    /// the steps, and that the stars around it, so many, show its clouds at their places only.
+    fn doubt_mag(
+        &self,
+        cell: usize,
+        cells: &[CellClouds],
+        stars: f64,
+        levels: &Levels,
+        texture: &Texture,
+    ) -> f64 {
+        /// How far around a cell its clouds are alike, in reaches of a cell.
+        const AROUND: f64 = 1.4;
+        let value = |near: usize| Some(cells[near].extinction_mag?.value);
+        let near = self.grid.cells_near(cell, AROUND).filter_map(value);
+        let (sum, count) = near.fold((0.0, 0.0), |(sum, count), mag| {
+            (sum + mag * mag, count + 1.0)
+        });
+        let variance_mag2 = texture.variance_mag2(sum / f64::max(count, 1.0));
+        let level = &levels.cells[cell];
+        let clear_mag = self.clear_sky.sigma_mag(level.airmass, level.off_axis_sq());
+        (variance_mag2 / stars.max(1.0) + clear_mag.powi(2) + STEP_MAG.powi(2) / 12.0).sqrt()
+    }
+
+    /// What the stars around a cell tell of it, if they do; the stars in it are counted in `clouds`.
+    fn around<'w>(
         &self,
         cell: usize,
         stars: impl Iterator<Item = (&'w Witness<'w>, &'w Cases)>,
         limit: Option<&RelativeLimit>,
         clouds: &mut CellClouds,
-    ) -> Option<Cases> {
+    ) -> Option<Around> {
         let mut total = [0.0; CASES];
-        let mut told = 0.0;
+        let [mut told, mut squares] = [0.0; 2];
         for (witness, logs) in stars {
             let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
                 continue;
@@ -114,13 +171,18 @@ impl Sky<'_> {
                 limit.is_some_and(|limit| limit.probability(witness.relative_mag) > EXPECTED);
             if is_expected || witness.star.measured.is_some() {
                 told += weight;
+                squares += weight * weight;
             }
             if witness.cell == cell && is_expected {
                 clouds.expected += 1;
                 clouds.detected += usize::from(witness.star.is_detected);
             }
         }
-        (told > LEAST_WEIGHT && self.depths[cell].is_some()).then_some(total)
+        let is_told = told > LEAST_WEIGHT && self.depths[cell].is_some();
+        is_told.then(|| Around {
+            ln_likelihoods: total,
+            stars: told * told / squares,
+        })
     }
 
     /// A cell with its light.
@@ -131,6 +193,7 @@ impl Sky<'_> {
         Some(LitCell {
             cell: told.cell,
             hidden,
+            by_stars: for_each_share(|share| told.likelihood_of(share)),
             light: levels.radiance_adu_sr(told.cell)?,
             terms: terms(camera, &place, &direction, zenith, self.moon.as_ref()),
         })
@@ -140,14 +203,10 @@ impl Sky<'_> {
     fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> Cases {
         let full = self.likelihoods(witness, limit);
         std::array::from_fn(|case| {
-            let likelihood = match case.checked_sub(STEPS) {
-                None => full[case],
-                // The star is as likely behind the clouds as beside them.
-                Some(step) => {
-                    let behind = half_mag(step) / STEP_MAG;
-                    0.5 * (full[0] + full[behind.round() as usize])
-                }
-            };
+            let Case { cover, mag, .. } = cases::case(case);
+            let behind = full[(mag / STEP_MAG).round() as usize];
+            // The star is behind the clouds, or beside them.
+            let likelihood = cover * behind + (1.0 - cover) * full[0];
             libm::log(likelihood.max(f64::MIN_POSITIVE))
         })
     }
