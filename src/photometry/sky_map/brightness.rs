@@ -141,7 +141,7 @@ struct LitPlace {
     zenith_weight: f64,
     /// Level of the sky, in ADU.
     level_adu: f64,
-    /// Distance from the frame's centre over that of the edge of the field, squared.
+    /// Distance from the lens's axis over that of the edge of the field, squared.
     off_axis_sq: f64,
     /// Solid angle of a pixel, in steradians, times the part of its light that the lens is known to let through.
     pixel_sr: f64,
