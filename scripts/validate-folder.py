@@ -134,7 +134,8 @@ class Folder:
             small.save(self.add("thumbnail", f"thumb_{name.removeprefix('image-')}"))
         columns = [np.repeat(picture[:, SIDE_PX // 2 : SIDE_PX // 2 + 1], 3, axis=1) for picture in pictures]
         jpeg(self.add("keogram", "keogram-20260115.jpg"), np.hstack(columns))
-        jpeg(self.add("keogram", "strip.jpg"), np.hstack(columns)[:, : SIDE_PX // 4])
+        # One that its name does not tell.
+        jpeg(self.add("keogram", "strip.jpg"), np.hstack(columns)[::-1, : SIDE_PX // 4])
         trails = self.trails()
         jpeg(self.add("startrails", "startrails-20260115.jpg"), trails)
         # One that its name does not tell.
