@@ -93,18 +93,23 @@ mod tests {
                 let clear = 1.0 + 0.5 * along + 0.005 * random.random_range(-1.0..1.0);
                 let added = if is_cloudy { 0.5 * of_cloud } else { 0.0 };
                 let told_cloudy = is_cloudy != random.random_bool(wrong);
-                let mut hidden = before();
-                if cell % 2 == 0 {
-                    for step in 0..=STEPS {
-                        let near = (share_of(step) - 0.5).abs() < 0.2;
-                        let likely = if near == told_cloudy { 1.0 } else { 0.02 };
-                        hidden.clear[step] *= likely;
-                        hidden.cloud[step] *= likely;
+                let by_stars = for_each_share(|share| {
+                    let near = (share - 0.5).abs() < 0.2;
+                    let is_untold = cell % 2 == 1;
+                    if is_untold || near == told_cloudy {
+                        1.0
+                    } else {
+                        0.02
                     }
+                });
+                let mut hidden = before();
+                for (step, likely) in by_stars.iter().enumerate() {
+                    hidden.clear[step] *= likely;
+                    hidden.cloud[step] *= likely;
                 }
                 LitCell {
                     cell,
-                    by_stars: std::array::from_fn(|step| hidden.clear[step] + hidden.cloud[step]),
+                    by_stars,
                     hidden,
                     light: clear * (1.0 + added),
                     terms: vec![1.0, along],

@@ -83,6 +83,8 @@ pub(super) struct Belief {
     evidence: Vec<Evidence>,
     /// Part of the sky that is not clear.
     pub clouded: f64,
+    /// Error of that.
+    sigma: f64,
 }
 
 impl Belief {
@@ -124,8 +126,10 @@ impl Belief {
             let share = if told.is_empty() { 0.5 } else { share };
             clouded = (BEFOREHAND + cells * share) / (2.0 * BEFOREHAND + cells);
         }
+        let information = mean(&|of| ((of.cloud.all - of.clear.all) / of.mixed(clouded)).powi(2));
         Self {
             priors,
+            sigma: (cells * information).sqrt().recip().min(0.5),
             limiting: [SMOOTH, BROKEN].map(|covers| Priors::new(mean_cloud_mag, &covers)),
             evidence,
             clouded,
@@ -166,27 +170,29 @@ impl Belief {
             clear(broken, CLEAR_MAG + doubt_mag),
         ]
     }
-}
 
-/// Share of the sky of which stars tell that is behind clouds, by the probabilities that cells are clear, with their
-/// bands.
-pub(super) fn cloud_share(told: &[Told], clear: impl Fn(&Told) -> [f64; 3]) -> Option<Estimate> {
-    /// The ends of all bands together, over the standard error that they are.
-    const BAND_SIGMAS: f64 = 2.0;
-    let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
-    let [mut clouded, mut band, mut chance] = [0.0; 3];
-    for told in told {
-        let weight = told.solid_angle_sr / all_sr;
-        let [low, clear, high] = clear(told);
-        clouded += weight * (1.0 - clear);
-        band += weight * (high - low);
-        // The same stars tell of several cells.
-        chance += CELLS_OF_A_STAR * weight * weight * clear * (1.0 - clear);
+    /// Share of the sky of which stars tell that is behind clouds, by the probabilities that cells are clear, with
+    /// their bands.
+    pub(super) fn share(
+        &self,
+        told: &[Told],
+        clear: impl Fn(&Told) -> [f64; 3],
+    ) -> Option<Estimate> {
+        /// The ends of all bands together, over the standard error that they are.
+        const BAND_SIGMAS: f64 = 2.0;
+        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        let [mut clouded, mut band] = [0.0; 2];
+        for told in told {
+            let weight = told.solid_angle_sr / all_sr;
+            let [low, clear, high] = clear(told);
+            clouded += weight * (1.0 - clear);
+            band += weight * (high - low);
+        }
+        (all_sr > 0.0).then(|| Estimate {
+            value: clouded,
+            sigma: libm::hypot(self.sigma, band / BAND_SIGMAS),
+        })
     }
-    (all_sr > 0.0).then(|| Estimate {
-        value: clouded,
-        sigma: libm::hypot(chance.sqrt(), band / BAND_SIGMAS),
-    })
 }
 
 /// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
@@ -321,7 +327,7 @@ mod tests {
         let clear: Vec<f64> = belief.cells().map(|(clear, _)| clear).collect();
         let bands = all.iter().map(|told| belief.clear_band(told, 0.05));
         let bands: Vec<[f64; 2]> = bands.collect();
-        cloud_share(all, |told| {
+        belief.share(all, |told| {
             let at = all
                 .iter()
                 .position(|other| other.cell == told.cell)
@@ -333,7 +339,7 @@ mod tests {
     #[test]
     fn broken_clouds_may_leave_a_cell_clear_that_smooth_ones_do_not() {
         let cells: Vec<Told> = (0..100)
-            .map(|cell| told(cell, 0.2, if cell < 50 { 0.01 } else { 2.0 }))
+            .map(|cell| told(cell, 0.3, if cell < 50 { 1e-3 } else { 1e4 }))
             .collect();
         let belief = Belief::of(&cells);
         for (told, (clear, _)) in cells.iter().zip(belief.cells()) {
@@ -341,7 +347,7 @@ mod tests {
             assert!(low <= clear && clear <= high, "{low} {clear} {high}");
         }
         let [low, high] = belief.clear_band(&cells[99], 0.05);
-        assert!(high - low > 0.2, "{low} {high}");
+        assert!(high - low > 0.1, "{low} {high}");
     }
 
     #[test]

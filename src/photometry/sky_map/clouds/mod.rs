@@ -15,7 +15,7 @@ use super::cloud_light::{CloudLight, Hidden, LitCell, for_each_share, terms};
 use super::relative_limit::RelativeLimit;
 use super::witnesses::{Sky, Witness};
 use crate::base::statistics::Estimate;
-use belief::{Belief, CLEAR_SIGMA_MAG, Told, cloud_share};
+use belief::{Belief, CLEAR_SIGMA_MAG, Told};
 pub use cases::CLEAR_MAG;
 use cases::{CASES, Case, Cases, STEP_MAG, STEPS, hidden_shares};
 use texture::Texture;
@@ -122,7 +122,7 @@ impl Sky<'_> {
             [low, clear.unwrap_or(0.5), high]
         };
         Clouds {
-            share: cloud_share(&told, bands),
+            share: belief.share(&told, bands),
             cells,
         }
     }
