@@ -68,7 +68,7 @@ def cell_errors(sky, maps):
     mags, altitude, azimuth = maps["mag_arcsec2"], maps["altitude_deg"], maps["azimuth_deg"]
     errors = []
     for cell in sky["cells"]:
-        if cell["mag_arcsec2"] is None or cell["altitude_deg"][0] < LOWEST_DEG:
+        if cell["mag_arcsec2"] is None or cell["altitude_deg"] is None or cell["altitude_deg"][0] < LOWEST_DEG:
             continue
         (low, high), (first, last) = cell["altitude_deg"], cell["azimuth_deg"]
         inside = (altitude >= low) & (altitude < high) & (azimuth >= first) & (azimuth < last)

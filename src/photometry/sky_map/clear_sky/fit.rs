@@ -13,6 +13,9 @@ type Covariance = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 /// Where they are too few, fainter ones count.
 const LARGEST_SIGMAS_MAG: [f64; 3] = [0.1, 0.25, 0.6];
 
+/// Shares of the stars that are above the relation at first.
+const ABOVE: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
+
 /// A fit to stars in clear air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
@@ -32,27 +35,31 @@ pub(super) struct ClearFit {
 impl ClearFit {
     /// The fit to the stars that are not dimmed. `None` if they are too few.
     pub fn of(candidates: &[Candidate], is_flat: bool) -> Option<Self> {
-        let fitted = |largest_mag| Self::to_brighter(candidates, largest_mag, is_flat);
+        let fitted = |largest_mag| Self::to_brighter(candidates, largest_mag, is_flat, &ABOVE);
         LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)
     }
 
-    /// The fit to all of them.
+    /// The fit to all of them, from fewer heights.
     pub fn to_all(candidates: &[Candidate], is_flat: bool) -> Option<Self> {
-        Self::to_brighter(candidates, f64::INFINITY, is_flat)
+        let heights = [ABOVE[0], ABOVE[2]];
+        Self::to_brighter(candidates, f64::INFINITY, is_flat, &heights)
     }
 
     /// The fit to those that have at most this expected error.
     ///
     /// Clear stars and those behind clouds are told apart by expectation and maximization, from several
     /// heights of the relation: the likeliest one counts.
-    fn to_brighter(candidates: &[Candidate], largest_mag: f64, is_flat: bool) -> Option<Self> {
-        /// Shares of the stars that are above the relation at first.
-        const ABOVE: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
+    fn to_brighter(
+        candidates: &[Candidate],
+        largest_mag: f64,
+        is_flat: bool,
+        heights: &[f64],
+    ) -> Option<Self> {
         let highest = Fit::first(candidates, largest_mag, is_flat, ABOVE[0])?;
         let counting = |star: &&Candidate| star.counts(&highest.unknowns, largest_mag);
         let common: Vec<&Candidate> = candidates.iter().filter(counting).collect();
-        let from = |above| Self::from(candidates, largest_mag, is_flat, above);
-        let fits = ABOVE.into_iter().filter_map(from);
+        let from = |above: &f64| Self::from(candidates, largest_mag, is_flat, *above);
+        let fits = heights.iter().filter_map(from);
         let rated = fits.map(|fit| (fit.ln_posterior(&common, is_flat), fit));
         let (_, best) = rated.max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(best)

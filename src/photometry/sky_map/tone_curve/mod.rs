@@ -36,6 +36,9 @@ use spot::{LitSpot, Spot};
 const SAMPLES: usize = 48;
 /// Largest error of a brightness that is worth stating, in magnitudes.
 const LARGEST_SIGMA_MAG: f64 = 0.7;
+/// Error of a brightness by a tone curve beyond how much the curves differ, in magnitudes: measured in frames that
+/// scripts/validate-tone-curves.py draws.
+const CURVE_SIGMA_MAG: f64 = 0.5;
 
 /// How gray levels go with light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,7 +130,7 @@ impl CurvedFrame<'_, '_> {
             ln_likelihood: 0.0,
             ln_weight: 0.0,
         };
-        let curved = self.by(&[linear], &self.black()?)?;
+        let curved = self.by(&[linear], &self.black()?, 0.0)?;
         Some(Curved {
             tone: None,
             ..curved
@@ -145,7 +148,7 @@ impl CurvedFrame<'_, '_> {
         };
         let evidence = CurveEvidence(fitted.iter().map(ln_likelihood).collect());
         let fitted: Vec<FittedCurve> = fitted.into_iter().flatten().collect();
-        let curved = self.by(&fitted, &black)?;
+        let curved = self.by(&fitted, &black, CURVE_SIGMA_MAG)?;
         Some(Curved {
             evidence: Some(evidence),
             ..curved
@@ -194,8 +197,10 @@ impl CurvedFrame<'_, '_> {
     /// The stars that are well enough measured to tell the curve. A choice by what they should be prefers none
     /// that noise makes brighter.
     fn spots(&self, white_adu: f64) -> Vec<Spot> {
-        const WANTED: usize = 60;
-        const LARGEST_SIGMAS_MAG: [f64; 3] = [0.1, 0.2, 0.4];
+        const WANTED: usize = 30;
+        const MOST: usize = 160;
+        /// Those with larger errors are seen where noise makes them brighter.
+        const LARGEST_SIGMAS_MAG: [f64; 2] = [0.06, 0.1];
         let frame = self.frame;
         let reach_px = spot::reach_px(frame.detections);
         let to = |largest_mag: f64| -> Vec<Spot> {
@@ -219,11 +224,15 @@ impl CurvedFrame<'_, '_> {
         let found = LARGEST_SIGMAS_MAG.map(to);
         let enough = found.iter().position(|spots| spots.len() >= WANTED);
         let chosen = enough.unwrap_or(found.len() - 1);
-        found.into_iter().nth(chosen).unwrap_or_default()
+        let mut chosen = found.into_iter().nth(chosen).unwrap_or_default();
+        // The brightest bend most.
+        chosen.sort_by(|a, b| a.v_mag().total_cmp(&b.v_mag()));
+        chosen.truncate(MOST);
+        chosen
     }
 
-    /// The mean brightness by `curves`.
-    fn by(&self, curves: &[FittedCurve], black: &Black) -> Option<Curved> {
+    /// The mean brightness by `curves`, with a further error.
+    fn by(&self, curves: &[FittedCurve], black: &Black, further_mag: f64) -> Option<Curved> {
         /// The golden ratio: levels without light are even over all curves, and over each kind of them.
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let sky_adu = self.levels.median_adu()?;
@@ -248,8 +257,9 @@ impl CurvedFrame<'_, '_> {
                 sigma: 0.0,
             });
         }
-        let cells: Vec<_> = cells.iter().map(|mean| mean.light(chosen.len())).collect();
-        let zenith = zenith.light(chosen.len()).map(ZenithSky::of);
+        let light = |mean: &Mean| mean.light(chosen.len(), further_mag);
+        let cells: Vec<Option<SkyLight>> = cells.iter().map(light).collect();
+        let zenith = light(&zenith).map(ZenithSky::of);
         let is_known = zenith.is_some() || cells.iter().any(Option::is_some);
         is_known.then(|| Curved {
             tone: exponent.estimate(chosen.len()).map(|exponent| {
@@ -346,11 +356,15 @@ impl Mean {
         })
     }
 
-    /// The mean brightness, where its error is small enough to be of use.
-    fn light(&self, expected: usize) -> Option<SkyLight> {
+    /// The mean brightness with a further error, where curves and levels without light leave it open by little
+    /// enough to be of use.
+    fn light(&self, expected: usize, further_mag: f64) -> Option<SkyLight> {
         let mag_arcsec2 = self.estimate(expected)?;
         (mag_arcsec2.sigma < LARGEST_SIGMA_MAG).then(|| SkyLight {
-            mag_arcsec2,
+            mag_arcsec2: Estimate {
+                sigma: libm::hypot(mag_arcsec2.sigma, further_mag),
+                ..mag_arcsec2
+            },
             bv_mag: None,
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag_arcsec2.value).luminance_cd_m2(),
         })

@@ -85,6 +85,11 @@ impl Spot {
         })
     }
 
+    /// V magnitude of the star.
+    pub fn v_mag(&self) -> f64 {
+        self.star.v_mag
+    }
+
     /// The star by a tone curve; `None` if it has no light.
     pub fn by(&self, curve: &ToneCurve) -> Option<LitSpot> {
         let count = self.levels_adu.len() as f64;
