@@ -106,7 +106,9 @@ impl CameraModel {
     /// Pixels on the border of the frame.
     fn border(&self) -> impl Iterator<Item = PixelPoint> {
         const PARTS: u32 = 12;
-        let corners = self.corners();
+        let [right, bottom] = [self.width_px - 0.5, self.height_px - 0.5];
+        let around = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
+        let corners = around.map(|[x, y]| PixelPoint::new(x, y));
         (0..4).flat_map(move |side| {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);
             (0..PARTS).map(move |part| between(from, to, f64::from(part) / f64::from(PARTS)))
@@ -119,12 +121,11 @@ impl CameraModel {
         const BISECTIONS: u32 = 20;
         /// Nothing is known beyond this share of the largest angle.
         const NEARLY: f64 = 0.999;
-        let Some(on_axis) = self.direction_of(&axis) else {
-            return Ok(());
-        };
+        // Terms that are too large for numbers image nothing, not even the axis.
+        let on_axis = self.direction_of(&axis);
         let angle_at = |share: f64| {
             let direction = self.direction_of(&between(axis, end, share))?;
-            Some(direction.angle_to(&on_axis))
+            Some(direction.angle_to(on_axis.as_ref()?))
         };
         let mut last = [0.0, 0.0];
         for step in 1..=STEPS {
@@ -179,6 +180,11 @@ mod tests {
     fn lenses_that_can_be_are_taken_and_others_are_not() {
         let pinhole = |focal_px| CameraModel::pinhole(640.0, 480.0, focal_px, false);
         assert_eq!(pinhole(900.0).check(), Ok(()));
+        let boundless = camera(DistortionModel::Radial, &[f64::INFINITY]).check();
+        assert!(
+            matches!(boundless, Err(ImplausibleLens::Fold { .. })),
+            "{boundless:?}"
+        );
         for focal_px in [1e308, 1e9, 1.0, f64::NAN, f64::INFINITY, -900.0] {
             let found = pinhole(focal_px).check();
             assert!(

@@ -1,6 +1,7 @@
 //! Reads the table `[lens]` of `camera.toml`: a lens that was measured.
 
 use super::error::DataSheetError;
+use crate::base::format::excerpt;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, Distortion, DistortionModel, KnownLens, Projection};
 use nalgebra::DMatrix;
@@ -49,7 +50,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Option<KnownLens>, DataSh
 impl LensTable {
     fn lens(self) -> Result<KnownLens, String> {
         let projection = Projection::named(&self.projection)
-            .ok_or_else(|| format!("there is no projection '{}'", self.projection))?;
+            .ok_or_else(|| format!("there is no projection '{}'", excerpt(&self.projection)))?;
         let [width_px, height_px] = [self.width_px, self.height_px].map(f64::from);
         let is_size = |side: f64| (1.0..=1e6).contains(&side);
         if !is_size(width_px) || !is_size(height_px) {
@@ -89,7 +90,7 @@ impl LensTable {
         let model = DistortionModel::ALL
             .into_iter()
             .find(|model| model.name() == name);
-        let model = model.ok_or_else(|| format!("there is no distortion '{name}'"))?;
+        let model = model.ok_or_else(|| format!("there is no distortion '{}'", excerpt(name)))?;
         let radius_px = self.radius_px.filter(|radius_px| *radius_px >= 1.0);
         let radius_px = radius_px.ok_or("radius_px is missing, or below 1")?;
         let terms = &self.terms_px;
