@@ -153,6 +153,9 @@ impl Reach {
 /// Where the stars see the axis of the lens, from the centre of the guessed frame along x and y, with the
 /// error as a measure of the frame's centre; `None` where they do not tell it, or the lens is no pinhole.
 fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]> {
+    /// What the model of a lens misses in the corners. A tilt moves stars there by the axis's offset times
+    /// the square of their angle, so in narrow fields it may look like one.
+    const MISSED_PX: f64 = 0.5;
     /// The places of the axis in the covariance, after ln f and three radial terms.
     const AXIS: [usize; 2] = [4, 5];
     if !found.camera.is_pinhole() {
@@ -174,10 +177,15 @@ fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]
     let model = Some(DistortionModel::BrownConrady);
     let fit = fit_jointly(&[frame], &found.camera, model)?;
     let (axis, centre) = (fit.camera.axis(), fit.camera.centre());
-    let usual_px = USUAL_AXIS * fit.camera.radius_px();
+    let radius_px = fit.camera.radius_px();
+    let radius_rad = radius_px / fit.camera.focal_length_px();
+    let sigma_px = libm::hypot(
+        USUAL_AXIS * radius_px,
+        MISSED_PX / (radius_rad * radius_rad),
+    );
     let measure = |value_px: f64, parameter: usize| Measure {
         value_px,
-        sigma_px: libm::hypot(fit.covariance[(parameter, parameter)].sqrt(), usual_px),
+        sigma_px: libm::hypot(fit.covariance[(parameter, parameter)].sqrt(), sigma_px),
     };
     Some([
         measure(axis.x - centre.x, AXIS[0]),
