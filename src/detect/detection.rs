@@ -149,9 +149,6 @@ pub struct MeasuredPsf {
     pub sigma_range_px: [f64; 2],
     /// Whether the spots are lopsided along the line from the centre of the frame: coma.
     pub is_comatic: bool,
-    /// How far the brightest point of a lopsided spot in a corner is from the centre of its light, in pixels; it
-    /// grows from the centre of the frame on.
-    pub corner_lopsidedness_px: f64,
 }
 
 /// The trails that all stars of a frame are.

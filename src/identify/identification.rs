@@ -125,21 +125,6 @@ impl Identification {
         }
     }
 
-    /// Adds the errors by lopsided spots (coma), whose place is uncertain between their brightest point and the
-    /// centre of their light: `corner_px` from each other in a corner, and less towards the centre of the frame. The
-    /// focal length follows that, and the attitude what is left of it on the axis of the lens.
-    pub fn add_coma(&mut self, corner_px: f64) {
-        /// Standard deviation of what lies anywhere between two points, over their distance.
-        const UNIFORM_SIGMA: f64 = 0.288_675;
-        let sigma_px = UNIFORM_SIGMA * corner_px;
-        let relative = sigma_px / self.camera.radius_px();
-        self.focal_length_sigma_px = libm::hypot(
-            self.focal_length_sigma_px,
-            relative * self.camera.central_focal_length_px(),
-        );
-        self.add_common_error(sigma_px * self.camera.off_centre_sq(&self.camera.axis()).sqrt());
-    }
-
     /// Adds the errors of aberration by the Earth's motion at an unknown date.
     pub fn add_unknown_aberration(&mut self) {
         /// The Earth's mean speed about the Sun over that of light.

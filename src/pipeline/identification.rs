@@ -48,13 +48,8 @@ pub(super) fn identify_stars(
             found = Ok(second);
         }
     }
-    if let Ok(found) = &mut found {
-        if let Some(trails) = detections.trails {
-            found.add_common_error(trails.middle_sigma_px);
-        }
-        if let Some(psf) = detections.psf.filter(|psf| psf.is_comatic) {
-            found.add_coma(psf.corner_lopsidedness_px);
-        }
+    if let (Ok(found), Some(trails)) = (&mut found, detections.trails) {
+        found.add_common_error(trails.middle_sigma_px);
     }
     let image = Some((frame, detections));
     let outcome = identified(found, image, &field, priors, context.indexed);

@@ -674,7 +674,7 @@ fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
         psf.axis_ratio
     )?;
     if psf.is_comatic {
-        f.write_str("; they have coma, and the stated errors of attitude and focal length include that the place of a lopsided spot is uncertain")?;
+        f.write_str("; they have coma, and the focal length and the lens model may be off by more than their stated errors")?;
     }
     Ok(())
 }

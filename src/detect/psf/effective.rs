@@ -211,7 +211,6 @@ impl EffectivePsf {
             axis_ratio: 1.0,
             sigma_range_px: [f64::INFINITY, 0.0],
             is_comatic: self.form == FieldForm::Radial,
-            corner_lopsidedness_px: self.corner_lopsidedness_px(size),
         };
         everywhere.fold(start, |psf, [ln_sigma, e1, e2]| {
             let ([least, largest], sigma_px) = (psf.sigma_range_px, libm::exp(ln_sigma));
@@ -221,26 +220,6 @@ impl EffectivePsf {
                 ..psf
             }
         })
-    }
-
-    /// Distance of the brightest point of a spot in a corner from the centre of its light, in pixels; 0 without coma.
-    fn corner_lopsidedness_px(&self, size: Size) -> f64 {
-        if self.form != FieldForm::Radial {
-            return 0.0;
-        }
-        let mut local = LocalPsf::default();
-        let [x_px, y_px] = size.sides().map(|side| (side - 1) as f64);
-        self.at(x_px, y_px, &mut local);
-        let light_at = |[x, y]: [f64; 2]| -> f64 {
-            let of_lobe = |lobe: &Lobe| {
-                let off = libm::hypot(x - lobe.offset_px[0], y - lobe.offset_px[1]) / lobe.sigma_px;
-                lobe.share / lobe.sigma_px.powi(2) * libm::exp(-0.5 * off * off)
-            };
-            local.lobes.iter().map(of_lobe).sum()
-        };
-        let places = local.lobes.iter().map(|lobe| lobe.offset_px);
-        let brightest = places.max_by(|a, b| light_at(*a).total_cmp(&light_at(*b)));
-        brightest.map_or(0.0, |[x, y]| libm::hypot(x, y))
     }
 
     /// The spot at a pixel, its centre of light at its place.

@@ -93,7 +93,7 @@ pub fn fit_camera(
 
 /// Fits the attitude and a lens that is no pinhole with all terms of lenses, from `camera` on, whose terms are those
 /// that the stars show: of the others is known what lenses are like. A lens's axis is where these terms put it, so
-/// an attitude without them has a smaller error than the truth. Sets `residuals_px` as [`fit_camera`]; `None` for the
+/// without them too small an error of the attitude would be stated. Sets `residuals_px` as [`fit_camera`]; `None` for the
 /// same reasons.
 pub(super) fn fit_with_unshown_terms(
     stars: &[MeasuredStar],
