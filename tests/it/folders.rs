@@ -14,7 +14,7 @@ fn frames(folder: &Path) {
     for number in 0..FRAMES {
         let ran = Ran::new(
             starpipe()
-                .args(["simulate", "--image=fits", "--camera", CAMERA])
+                .args(["simulate", "--force", "--image=fits", "--camera", CAMERA])
                 .args(["--site=47,8,500", "--dec=46.9"])
                 .arg(format!("--ra={}", 62.8 + 0.25 * number as f64))
                 .arg(format!("--date=2026-01-15T20:{number:02}Z"))
