@@ -41,6 +41,8 @@ const MAX_OTHERS: usize = 16;
 const MIN_SHARE: f64 = 0.02;
 /// Shares of the light that wings may have, all as likely before they are measured.
 const LIKELY_SHARES: [f64; 2] = [-0.05, 0.20];
+/// Beyond these shares what was measured are no wings: the background around the stars, or a spot that is not theirs.
+const POSSIBLE_SHARES: [f64; 2] = [-0.15, 0.40];
 /// Share of the frames that have such wings.
 const LIKELY_FRAMES: f64 = 0.1;
 /// Stars farther than this many standard errors from the median do not count.
@@ -88,6 +90,13 @@ impl FluxScale {
     /// That of a frame whose spots lack this share of the light of the fitted ones.
     fn of(lacking: &Estimate) -> Self {
         let Estimate { value, sigma } = *lacking;
+        let [least, most] = POSSIBLE_SHARES;
+        if !(least..=most).contains(&value) {
+            return Self {
+                wings: None,
+                sigma: value.clamp(least, most).abs(),
+            };
+        }
         let [least, most] = LIKELY_SHARES;
         // The probabilities of what was measured, without wings and with any.
         let without = (1.0 - LIKELY_FRAMES) * normal_density(value / sigma) / sigma;

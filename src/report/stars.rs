@@ -81,7 +81,10 @@ impl ReportedPointing<'_> {
         let is_blend = star_match.light != apparent;
         if is_blend {
             star.residual_blend_px = self.residual_px(star, &star_match.light);
-            self.add_shift(star, [&apparent, &star_match.light]);
+            // On the coarse pixels of wide lenses most blends are not known to be such.
+            if !self.identification.camera.is_pinhole() {
+                self.add_shift(star, [&apparent, &star_match.light]);
+            }
         }
         star.set_direction(&direction);
     }
