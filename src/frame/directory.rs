@@ -2,10 +2,10 @@
 
 use super::compressed::format_inside;
 use super::error::FrameError;
-use super::folder::OtherFile;
 use super::foreign;
 use super::format::FrameFormat;
 use super::limits::HEAD_BYTES;
+use super::other_file::OtherFile;
 use crate::base::files;
 use memchr::memmem;
 use std::io::{self, Read};

@@ -25,6 +25,7 @@ use super::directory::{all_files_in, foreign_file, head_of, other_kind};
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::limits::MAX_FILE_BYTES;
+use super::other_file::OtherFile;
 use super::tiff::TiffFile;
 use crate::base::epoch::ObservationDate;
 use crate::base::files;
@@ -41,110 +42,6 @@ use xxhash_rust::xxh3::Xxh3;
 pub const MIN_FRAMES: usize = 3;
 /// Folders below one without frames that are looked into: those of nights and hours.
 const MAX_DEPTH: usize = 4;
-
-/// What a file in a folder is, if it is no frame of the sky.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "as `text` says")]
-pub enum OtherFile {
-    Thumbnail,
-    Keogram,
-    Startrails,
-    Panorama,
-    Stack,
-    Copy,
-    Calibration,
-    Video,
-    OtherFormat,
-    NoImage,
-    Hidden,
-    Product,
-}
-
-impl OtherFile {
-    const ALL: [Self; 12] = [
-        Self::Thumbnail,
-        Self::Keogram,
-        Self::Startrails,
-        Self::Panorama,
-        Self::Stack,
-        Self::Copy,
-        Self::Calibration,
-        Self::Video,
-        Self::OtherFormat,
-        Self::NoImage,
-        Self::Hidden,
-        Self::Product,
-    ];
-
-    /// Code for programs.
-    pub const fn code(self) -> &'static str {
-        match self {
-            Self::Thumbnail => "thumbnail",
-            Self::Keogram => "keogram",
-            Self::Startrails => "startrails",
-            Self::Panorama => "panorama",
-            Self::Stack => "stack",
-            Self::Copy => "copy",
-            Self::Calibration => "calibration",
-            Self::Video => "video",
-            Self::OtherFormat => "other_format",
-            Self::NoImage => "no_image",
-            Self::Hidden => "hidden",
-            Self::Product => "product",
-        }
-    }
-
-    /// That of a code.
-    pub fn of_code(code: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.code() == code)
-    }
-
-    /// In words, for one and for several.
-    pub const fn text(self) -> [&'static str; 2] {
-        match self {
-            Self::Thumbnail => ["thumbnail", "thumbnails"],
-            Self::Keogram => ["keogram", "keograms"],
-            Self::Startrails => ["picture of star trails", "pictures of star trails"],
-            Self::Panorama => ["panorama", "panoramas"],
-            Self::Stack => ["stack of frames", "stacks of frames"],
-            Self::Copy => ["copy of a frame", "copies of frames"],
-            Self::Calibration => ["dark, bias or flat", "darks, biases or flats"],
-            Self::Video => ["video", "videos"],
-            Self::OtherFormat => [
-                "file in a format that is not read",
-                "files in formats that are not read",
-            ],
-            Self::NoImage => ["file that is no image", "files that are no images"],
-            Self::Hidden => ["hidden file", "hidden files"],
-            Self::Product => ["product of starpipe", "products of starpipe"],
-        }
-    }
-
-    /// What one of the words of a name says.
-    fn of_word(word: &str) -> Option<Self> {
-        Some(match word {
-            "thumb" | "thumbs" | "thumbnail" | "thumbnails" => Self::Thumbnail,
-            "keogram" | "keograms" => Self::Keogram,
-            "startrail" | "startrails" => Self::Startrails,
-            "panorama" | "panoramas" => Self::Panorama,
-            "fieldsum" | "fieldsums" => Self::Stack,
-            _ => return None,
-        })
-    }
-
-    /// What two words after each other say.
-    fn of_words(words: &[String]) -> Option<Self> {
-        let both = |one: &str, two: &str| words[0] == one && words[1] == two;
-        if both("star", "trail") || both("star", "trails") {
-            Some(Self::Startrails)
-        } else if both("captured", "stack") || both("detected", "stack") || both("meteor", "stack")
-        {
-            Some(Self::Stack)
-        } else {
-            None
-        }
-    }
-}
 
 /// Whose frames are in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -49,6 +49,7 @@ mod memory;
 mod metadata;
 mod mosaic;
 mod orientation;
+mod other_file;
 mod pages;
 mod pixels;
 mod raster;
@@ -72,7 +73,7 @@ pub use error::FrameError;
 pub(crate) use fits::{BLOCK_BYTES, write_rows};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
 #[doc(hidden)]
-pub use folder::{Cameras, Folder, OtherFile, PassedOver};
+pub use folder::{Cameras, Folder, PassedOver};
 pub use format::FrameFormat;
 pub use image::Frame;
 #[doc(hidden)]
@@ -89,6 +90,7 @@ pub use metadata::{Assumption, FrameMetadata};
 pub use metadata::{IgnoredValue, ImageChoice};
 pub use mosaic::{BayerPattern, Mosaic};
 pub use orientation::Orientation;
+pub use other_file::OtherFile;
 #[doc(hidden)]
 pub use pages::{ImageName, PageChoice, Pages};
 pub use pixels::Pixels;

@@ -1,6 +1,6 @@
 //! The calibration: frames are sorted out, the lens is chosen and fitted.
 
-use super::contradictions::contradictions;
+use super::contradictions::{MISFIT, MISFIT_PX, contradictions, distances_px};
 use super::copies::without_copies;
 use super::coverage::Coverage;
 use super::cross_validation::{best_lens, rms_px};
@@ -21,10 +21,6 @@ pub const MEASURED_BY: &str = "Measured by starpipe";
 const ROUNDS: usize = 5;
 /// The relative difference of focal lengths at which a frame is of another lens.
 const OTHER_FOCAL_LENGTH: f64 = 0.01;
-/// The median distance of a frame's stars, over that of all frames, at which the lens misses them.
-pub(super) const MISFIT: f64 = 2.0;
-/// The least such distance, in pixels.
-pub(super) const MISFIT_PX: f64 = 0.1;
 
 /// Why no lens is measured.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -374,15 +370,6 @@ fn limited(camera: &CameraModel, frames: &[LensFrame], repeats: &Repeats) -> Cam
         }
         _ => *camera,
     }
-}
-
-/// The median distance of the stars of each frame, in pixels.
-pub(super) fn distances_px(fit: &JointFit) -> Vec<f64> {
-    let of_frame = |residuals: &Vec<[f64; 2]>| {
-        let distances = residuals.iter().map(|[x, y]| libm::hypot(*x, *y));
-        median(&mut distances.collect::<Vec<f64>>())
-    };
-    fit.residuals_px.iter().map(of_frame).collect()
 }
 
 /// Standard deviation of residuals on each axis.

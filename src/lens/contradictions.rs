@@ -1,9 +1,13 @@
 //! Which frames contradict the others, where no lens fits all of them?
 
-use super::calibrate::{MISFIT, MISFIT_PX, distances_px};
 use super::frames::Unfit;
+use crate::base::statistics::median;
 use crate::identify::fit::{JointFit, JointFrame, fit_jointly};
 
+/// The median distance of a frame's stars, over that of all frames, at which the lens misses them.
+pub(super) const MISFIT: f64 = 2.0;
+/// The least such distance, in pixels.
+pub(super) const MISFIT_PX: f64 = 0.1;
 /// Frames that are tried as those that the others are compared with.
 const MOST_REFERENCES: usize = 12;
 
@@ -48,4 +52,13 @@ pub(super) fn contradictions(frames: &[JointFrame], fit: &JointFit) -> Vec<(usiz
         .map(against)
         .min_by_key(Vec::len)
         .unwrap_or_default()
+}
+
+/// The median distance of the stars of each frame, in pixels.
+pub(super) fn distances_px(fit: &JointFit) -> Vec<f64> {
+    let of_frame = |residuals: &Vec<[f64; 2]>| {
+        let distances = residuals.iter().map(|[x, y]| libm::hypot(*x, *y));
+        median(&mut distances.collect::<Vec<f64>>())
+    };
+    fit.residuals_px.iter().map(of_frame).collect()
 }

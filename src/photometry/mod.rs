@@ -22,6 +22,7 @@ mod color_frame;
 pub mod comparison;
 pub mod completeness;
 mod identified_frame;
+mod measured;
 pub mod sky_map;
 mod standards;
 pub mod zero_point;
@@ -31,6 +32,8 @@ pub(crate) use association::{filter_response, resolved_px};
 pub use color_frame::{ColorFrame, PictureColors};
 #[doc(hidden)]
 pub use identified_frame::IdentifiedFrame;
+#[doc(hidden)]
+pub use measured::instrumental_mag;
 
 use crate::base::statistics::median;
 use crate::detect::Detection;
@@ -38,15 +41,13 @@ use crate::identify::{IndexedCatalog, SkyView};
 use crate::sky::catalog::StarIndex;
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
+use measured::{MAG_PER_RELATIVE, Measured};
 use standards::Standards;
 use zero_point::{NoZeroPoint, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
 #[doc(hidden)]
 pub const SUN_BV_MAG: f64 = 0.64;
-
-/// Magnitudes per relative error: 2.5 / ln 10.
-const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
 
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,35 +109,6 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
         exposure_s: frame.exposure_s,
         completeness,
     }
-}
-
-/// A star's brightness in a frame.
-#[derive(Debug, Clone, Copy)]
-struct Measured {
-    /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without its neighbors' light and what the
-    /// lens takes.
-    instrumental_mag: f64,
-    /// Its standard error.
-    sigma_mag: f64,
-}
-
-impl Measured {
-    /// That of a detection.
-    fn of(frame: &IdentifiedFrame, star: &FrameStar, detection: &Detection) -> Self {
-        let flux_adu = detection.flux_adu
-            / (1.0 + star.neighbors_light)
-            / frame.lens_transmission(&detection.position);
-        Self {
-            instrumental_mag: instrumental_mag(flux_adu / frame.exposure_s.unwrap_or(1.0)),
-            sigma_mag: MAG_PER_RELATIVE / detection.snr,
-        }
-    }
-}
-
-/// −2.5 log10(`flux`): the magnitude without zero point.
-#[doc(hidden)]
-pub fn instrumental_mag(flux: f64) -> f64 {
-    -2.5 * libm::log10(flux)
 }
 
 /// The V magnitude to which catalogue stars are predicted: clearly fainter ones cannot be detected.

@@ -5,8 +5,9 @@
 
 use super::association::FrameStar;
 use super::completeness::Fall;
+use super::identified_frame::IdentifiedFrame;
+use super::measured::Measured;
 use super::zero_point::{MIN_STARS, NoZeroPoint, StandardStar};
-use super::{IdentifiedFrame, Measured};
 use crate::detect::Detection;
 use crate::identify::IndexedCatalog;
 

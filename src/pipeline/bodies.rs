@@ -2,7 +2,7 @@
 
 use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;
-use super::solution::Source;
+use super::source::Source;
 use crate::base::statistics::median;
 use crate::identify::{Identification, Priors, SourceIndex};
 use crate::photometry::instrumental_mag;

@@ -9,7 +9,7 @@
 //!
 //! A list may be of a part of its frame, which the gaps do not show: half of the lists are taken to be such.
 
-use super::centroid_list::{CentroidList, ListedCentroid};
+use super::centroid_list::CentroidList;
 use super::centroid_table::{CentroidListError, check_inside};
 use super::outcome::Outcome;
 use crate::base::size::Size;
@@ -39,7 +39,7 @@ impl ListFrame {
                 .map_err(|problem| CentroidListError::of_row(centroid.row, problem))?;
         }
         Ok(Self {
-            size: reached_size(list, stated),
+            size: list.reached_size(stated),
             is_guessed: stated.map(|side| side.is_none()),
         })
     }
@@ -58,7 +58,7 @@ impl ListFrame {
                 return Beyond::default();
             }
             let reach = Reach {
-                gap_px: reach_px(&list.centroids, along)[0].max(0.0),
+                gap_px: list.reach_px(along)[0].max(0.0),
                 side_px: self.size.sides()[along] as f64,
                 stars: list.centroids.len(),
             };
@@ -70,26 +70,6 @@ impl ListFrame {
             axis_sigma_px: USUAL_AXIS * found.camera.radius_px(),
         });
     }
-}
-
-/// The size of a frame with these sides, or as far as its centroids reach.
-pub(super) fn reached_size(list: &CentroidList, stated: [Option<usize>; 2]) -> Size {
-    let [width, height] = [0, 1].map(|axis| {
-        let reach = || (reach_px(&list.centroids, axis)[1].round() as usize).saturating_add(1);
-        stated[axis].unwrap_or_else(reach)
-    });
-    Size::new(width, height)
-}
-
-/// The smallest and the largest coordinate of centroids, from 0 on.
-fn reach_px(centroids: &[ListedCentroid], axis: usize) -> [f64; 2] {
-    let places = centroids.iter().map(|centroid| {
-        let place = centroid.position;
-        [place.x, place.y][axis]
-    });
-    places.fold([f64::INFINITY, 0.0], |[low, high], place| {
-        [place.min(low), place.max(high)]
-    })
 }
 
 /// A quantity with its standard error, in pixels.

@@ -32,7 +32,9 @@ mod prepared;
 mod raw_color;
 mod solution;
 mod solve;
+mod solve_list;
 mod solved;
+mod source;
 mod star_field;
 mod stopwatch;
 
@@ -40,7 +42,7 @@ pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
 #[doc(hidden)]
 pub use centroid_list::LISTED_SIGMA_PX;
-pub use centroid_list::{CentroidList, ListedCentroid, solve_centroids};
+pub use centroid_list::{CentroidList, ListedCentroid};
 pub use centroid_table::{CentroidListError, CentroidListOptions};
 #[doc(hidden)]
 pub use context::DEFAULT_TIME_LIMIT_S;
@@ -56,10 +58,12 @@ pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};
 pub use place_time::{Change, Contradiction, PlaceTime, Proposal};
 pub use raw_color::RawColor;
-pub use solution::{Background, Measured, Solution, Source};
+pub use solution::{Background, Solution};
 pub use solve::{solve_file, solve_frame};
 #[doc(hidden)]
 pub use solve::{solve_guarded, solve_read};
+pub use solve_list::solve_centroids;
+pub use source::{Measured, Source};
 pub use star_field::star_field;
 #[doc(hidden)]
 pub use stopwatch::Stage;

@@ -4,10 +4,10 @@ use super::body_in_frame::BodyInFrame;
 use super::note::Note;
 use super::outcome::Outcome;
 use super::place_time::PlaceTime;
+use super::source::Source;
 use super::stopwatch::Timing;
-use crate::base::coords::PixelPoint;
 use crate::calibration::Applied;
-use crate::detect::{Detection, DetectionFlags, Trail};
+use crate::detect::Trail;
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
 use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
@@ -117,47 +117,6 @@ impl Solution {
             };
             sigma_px.is_finite().then_some((named.star, star))
         })
-    }
-}
-
-/// One source: a detection, or a line of a centroid list.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Source {
-    /// Its centroid.
-    pub position: PixelPoint,
-    /// What only a detection has.
-    pub measured: Option<Measured>,
-    /// Flux above the background, in the frame's own units, if known.
-    pub flux: Option<f64>,
-}
-
-/// What only a detection has.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Measured {
-    /// Standard errors of the centroid in x and y, in pixels.
-    pub sigma_px: [f64; 2],
-    /// Brightest pixel above the background, in the frame's own units.
-    pub peak: f64,
-    /// Flux over its standard error.
-    pub snr: f64,
-    /// What is unusual about it.
-    pub flags: DetectionFlags,
-}
-
-impl From<&Detection> for Source {
-    fn from(detection: &Detection) -> Self {
-        Self {
-            position: detection.position,
-            measured: Some(Measured {
-                sigma_px: [detection.sigma_x_px, detection.sigma_y_px],
-                peak: detection.peak_adu,
-                snr: detection.snr,
-                flags: detection.flags,
-            }),
-            flux: Some(detection.flux_adu),
-        }
     }
 }
 

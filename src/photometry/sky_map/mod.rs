@@ -24,6 +24,7 @@ mod clear_sky;
 mod cloud_light;
 mod clouds;
 mod color;
+mod curve_evidence;
 mod dark_level;
 mod depth;
 mod grid;
@@ -41,6 +42,8 @@ pub use brightness::MOON_REACH_DEG;
 pub use brightness::{NoBrightness, SkyLight, ZenithSky};
 pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
+#[doc(hidden)]
+pub use curve_evidence::CurveEvidence;
 pub use dark_level::{DarkLevel, DarkSource};
 pub use grid::Place;
 #[doc(hidden)]
@@ -49,8 +52,6 @@ pub use grid::{horizon_places, is_wide};
 pub use limits::StatedLimit;
 #[doc(hidden)]
 pub use picture::Picture;
-#[doc(hidden)]
-pub use tone_curve::CurveEvidence;
 pub use tone_curve::{CurveKind, ToneFit};
 
 use super::IdentifiedFrame;

@@ -1,7 +1,7 @@
 //! The pixels in which the sky is measured.
 
+use super::curve_evidence::CurveEvidence;
 use super::dark_level::DarkLevel;
-use super::tone_curve::CurveEvidence;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::frame::Frame;
 use crate::photometry::PictureColors;

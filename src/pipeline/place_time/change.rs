@@ -1,6 +1,6 @@
 //! What may be wrong with a stated place and time, and what it would be then.
 
-use super::Sky;
+use super::sky::Sky;
 use crate::base::clock::of_hours;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;

@@ -3,7 +3,8 @@
 //! A planet that is missing alone says little: it may be behind a tree, and drawn frames have none.
 
 use super::change::{Candidate, other_dates};
-use super::{Assessed, Contradiction};
+use super::contradiction::Contradiction;
+use super::examination::Assessed;
 use crate::base::coords::{PixelPoint, UnitVector};
 use crate::base::statistics::median;
 use crate::base::units::RAD_PER_DEG;

@@ -1,12 +1,24 @@
 //! What would put a place and a time right.
 
 use super::change::{Candidate, Change, longitude_of_hours};
-use super::{Contradiction, PlaceTime};
+use super::contradiction::Contradiction;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::counted;
 use crate::base::units::DEG_PER_RAD;
-use crate::sky::observer::Site;
+use crate::sky::observer::{Observation, Site};
 use std::fmt;
+
+/// A place and a time that the stars contradict.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct PlaceTime {
+    /// Where the frame's centre would be in the sky.
+    pub stated: Option<Observation>,
+    /// What contradicts them.
+    pub contradictions: Vec<Contradiction>,
+    /// What would put them right, the most likely first.
+    pub proposals: Vec<Proposal>,
+}
 
 /// A change that would put a place and a time right.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! What a frame shows of the sky over its place: its named stars, and where it looks.
 
-use super::super::solution::Source;
+use super::super::source::Source;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::identify::{Identification, SourceIndex};

@@ -1,6 +1,6 @@
 //! Which zone a local time is of, by the place and the stars.
 
-use super::Examination;
+use super::examination::Examination;
 use crate::base::clock::of_hours;
 use crate::base::epoch::ObservationDate;
 use crate::sky::observer::Site;

@@ -6,6 +6,8 @@ pub const CLEAR_MAG: f64 = 0.2;
 /// Step of the extinctions that are compared, in magnitudes, and their number.
 pub(super) const STEP_MAG: f64 = 0.05;
 pub(super) const STEPS: usize = 121;
+/// Variation of the extinction within a cell, over the extinction.
+pub(super) const CLOUD_VARIATION: f64 = 0.3;
 /// Parts of a cell that clouds cover where they are broken,
 const COVERS: [f64; 2] = [0.5, 0.25];
 /// and the step of their extinctions, in magnitudes, and their number.

@@ -17,11 +17,9 @@ use super::witnesses::{Sky, Witness};
 use crate::base::statistics::Estimate;
 use belief::{Belief, CLEAR_SIGMA_MAG, Told};
 pub use cases::CLEAR_MAG;
-use cases::{CASES, Case, Cases, STEP_MAG, STEPS, hidden_shares};
+use cases::{CASES, CLOUD_VARIATION, Case, Cases, STEP_MAG, STEPS, hidden_shares};
 use texture::Texture;
 
-/// Variation of the extinction within a cell, over the extinction.
-const CLOUD_VARIATION: f64 = 0.3;
 /// Share of stars whose brightness or presence tells nothing: variable stars, wrong names.
 const UNTRUE: f64 = 0.02;
 /// Weight of the stars that tell of a cell at least: without any, nothing is known of it.

@@ -3,8 +3,7 @@
 //! Neighboring stars are behind the same clouds as far as these are even. What their extinctions differ beyond
 //! their errors is the clouds' texture.
 
-use super::CLOUD_VARIATION;
-use super::cases::CLEAR_MAG;
+use super::cases::{CLEAR_MAG, CLOUD_VARIATION};
 use crate::base::statistics::Estimate;
 use crate::photometry::sky_map::neighbor::neighbor;
 use crate::photometry::sky_map::witnesses::{Sky, Witness};

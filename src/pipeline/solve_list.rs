@@ -1,0 +1,147 @@
+//! Identification of a list of centroids.
+
+use super::bodies::find_bodies;
+use super::centroid_list::CentroidList;
+use super::centroid_table::CentroidListError;
+use super::context::{Context, Workspace};
+use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
+use super::list_frame::ListFrame;
+use super::note::Note;
+use super::place_time::{Settled, settle};
+use super::solution::Solution;
+use super::source::Source;
+use super::stopwatch::{Stage, Stopwatch};
+use crate::base::size::Size;
+use crate::identify::{Priors, ScalePrior, ScaleSource};
+
+/// What is known of a list whose frame has this size.
+fn priors_of(size: Size, context: &Context) -> Priors {
+    let of_camera = context.camera.as_ref().map(|camera| ScalePrior {
+        source: ScaleSource::User,
+        ..ScalePrior::of_camera(&camera.sheet)
+    });
+    let lens = context.lens_of(size.width, size.height);
+    let lens_scale = lens.map(ScalePrior::of_lens);
+    Priors {
+        scale: context.priors.scale.or(lens_scale).or(of_camera),
+        holds_lens: lens.is_some(),
+        ..context.priors
+    }
+}
+
+/// Identifies the stars of a list of centroids. Every prior is a hard constraint.
+///
+/// Where nobody states the size of the frame, it is as large as the centroids reach, and the errors have
+/// that its centre is not known.
+///
+/// # Errors
+/// [`CentroidListError`] where the stated size is not that of the context's camera, or a centroid lies
+/// outside the frame.
+///
+/// # Example
+/// ```
+/// use starpipe::identify::Photometry;
+/// use starpipe::pipeline::ListedCentroid;
+/// use starpipe::{CameraModel, Catalog, CentroidList, Context, IndexedCatalog};
+/// use starpipe::{Rotation, UnitVector, Workspace, solve_centroids};
+///
+/// // The stars to V 7 are enough for wide fields, and are indexed in a moment.
+/// let catalog = Catalog::built_in().limited_to(7.0);
+/// let indexed = IndexedCatalog::build(&catalog, &|_| ());
+/// // What a camera of 20° sees of the Southern Cross.
+/// let camera = CameraModel::pinhole(1024.0, 768.0, 2900.0, false);
+/// let attitude = Rotation::looking_at(&UnitVector::from_ra_dec(3.3, -1.1), 0.5);
+/// let centroids = catalog.stars().iter().filter_map(|star| {
+///     let pixel = camera.pixel_of(&attitude.apply(&star.direction))?;
+///     let listed = ListedCentroid::new(pixel, f64::from(star.v_mag));
+///     camera.contains(&pixel).then_some(listed)
+/// });
+/// let list = CentroidList {
+///     width: Some(1024),
+///     height: Some(768),
+///     photometry: Photometry::JohnsonV,
+///     has_brightness: true,
+///     centroids: centroids.collect(),
+/// };
+/// let solution = solve_centroids(&list, &Context::new(&indexed), &mut Workspace::new())?;
+/// let found = solution.outcome.identification().expect("the stars are identified");
+/// assert!(found.icrs_to_camera.angle_to(&attitude) < 1e-5);
+/// # Ok::<(), starpipe::pipeline::CentroidListError>(())
+/// ```
+pub fn solve_centroids(
+    list: &CentroidList,
+    context: &Context,
+    workspace: &mut Workspace,
+) -> Result<Solution, CentroidListError> {
+    let mut clock = Stopwatch::start(context.on_stage);
+    workspace.set_deadline(clock.deadline(context.time_limit));
+    let (list, left_out) = list.usable();
+    let frame = ListFrame::of(&list, &context.camera_sizes())?;
+    let [width, height] = frame.size.sides();
+    let priors = &priors_of(frame.size, context);
+    let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
+    let catalog = context.indexed.catalog();
+    let mut identify = |places| {
+        let field = list.star_field_in(frame.size, places);
+        let workspace = &mut workspace.identify;
+        let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
+        identified(found, None, &field, priors, context.indexed)
+    };
+    let answer = through_air_or_not(priors.places(), &mut identify);
+    let known = (priors, context.utc_offset);
+    let Settled {
+        mut outcome,
+        priors,
+        place_time,
+        ..
+    } = settle(answer, known, (&sources, catalog), |places| {
+        through_air_or_not(places, &mut identify)
+    });
+    let priors = &priors;
+    let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
+        list.star_field_in(frame.size, priors.places())
+    });
+    frame.add_unknown_centre(&list, &mut outcome);
+    let observation = observation(&outcome, priors);
+    let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
+    clock.lap(Stage::Identify);
+    let note = Note::of_observation(observation.as_ref(), priors, &outcome);
+    let note = Note::of_place_time(place_time.as_ref()).chain(note);
+    let notes = left_out.into_iter().map(Note::RowsLeftOut);
+    let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
+    let guessed = Note::of_guessed_size(&frame, outcome.identification());
+    let notes = notes.chain(unknown).chain(guessed).chain(note);
+    let notes = notes
+        .chain(second_images.double.map(Note::DoubleImage))
+        .chain(second_images.repeated.map(Note::RepeatedSky));
+    let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
+    let notes = notes.chain(Note::of_residuals(outcome.identification()));
+    let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
+    let notes = notes.chain(Note::of_lens(context.lens.as_deref(), &outcome));
+    let notes = notes.chain(Note::of_date(priors, &outcome));
+    Ok(Solution {
+        width,
+        height,
+        row_order: None,
+        date: priors.date,
+        notes: notes.collect(),
+        observation,
+        place_time,
+        site: priors.site,
+        exposure_s: priors.exposure_s,
+        spot_sigma_px: None,
+        sources,
+        background: None,
+        attitude_only: context.attitude_only,
+        attitude_frame: context.attitude_frame,
+        outcome,
+        bodies,
+        photometry: None,
+        sky: None,
+        trails: None,
+        comparison: None,
+        gain_e_per_adu: None,
+        calibration: None,
+        timing: clock.timing(),
+    })
+}
