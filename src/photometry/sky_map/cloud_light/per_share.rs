@@ -5,6 +5,7 @@
 
 use super::lit_cell::{LitCell, STEPS, share_of};
 use crate::photometry::sky_map::grid::CELLS_OF_A_STAR;
+use std::f64::consts::TAU;
 
 /// Share of cells whose light tells nothing.
 const UNTRUE: f64 = 0.02;
@@ -70,13 +71,14 @@ impl CloudyCell<'_> {
         let step_of = |share: f64| (share * STEPS as f64).clamp(0.0, STEPS as f64);
         let first = step_of(share - FAR_SIGMAS * sigma).floor() as usize;
         let last = step_of(share + FAR_SIGMAS * sigma).ceil() as usize;
-        let [mut all, mut foretold] = [f64::MIN_POSITIVE; 2];
-        for step in first..=last {
-            let off = (share_of(step) - share) / sigma.max(share_of(1));
-            let weight = libm::exp(-0.5 * off * off);
-            all += weight;
-            foretold += weight * self.lit.by_stars[step];
-        }
+        let width = sigma.max(share_of(1));
+        let weighted = (first..=last).map(|step| {
+            let off = (share_of(step) - share) / width;
+            libm::exp(-0.5 * off * off) * self.lit.by_stars[step]
+        });
+        // The weights of all steps, also of shares that there are not: of these no star tells.
+        let all = width * STEPS as f64 * TAU.sqrt();
+        let foretold: f64 = weighted.sum();
         let any = self.lit.by_stars.iter().sum::<f64>() / (STEPS + 1) as f64;
         (1.0 - UNTRUE) * foretold / all + UNTRUE * any
     }
