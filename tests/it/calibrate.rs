@@ -213,7 +213,7 @@ fn lenses_of_other_programs_are_written_and_held() {
         option("opencv", "cv.yaml"),
         option("ros", "ros.yaml"),
         option("platepar", "rms.cal"),
-        "--site=46.5,7.9,500".to_owned(),
+        "--site=20,-170,500".to_owned(),
     ];
     let more: Vec<&str> = more.iter().map(String::as_str).collect();
     calibrated(&[&night], &more);
