@@ -115,7 +115,8 @@ struct Light {
     saturated: f64,
     /// Standard deviation of a pixel by differences of neighbors.
     noise: f64,
-    /// From the darkest to the brightest of the medians of 8 × 8 parts.
+    /// The darkest of the medians of 8 × 8 parts, and how much brighter the brightest is.
+    least: f64,
     range: f64,
     step: f64,
 }
@@ -135,10 +136,8 @@ impl Light {
         let medians = (0..PARTS * PARTS).filter_map(|part| part_median(frame, part));
         let mut medians: Vec<f64> = medians.collect();
         medians.sort_unstable_by(f64::total_cmp);
-        let range = medians
-            .last()
-            .zip(medians.first())
-            .map(|(most, least)| most - least);
+        let least = medians.first().copied().unwrap_or(f64::NAN);
+        let range = medians.last().map_or(f64::NAN, |most| most - least);
         let values = || {
             let values = frame.pixels.values().step_by(7).map(f64::from);
             values.filter(|value| !value.is_nan())
@@ -154,9 +153,17 @@ impl Light {
             full,
             saturated: saturated as f64 / total,
             noise: noise(frame),
-            range: range.unwrap_or(f64::NAN),
+            least,
+            range,
             step: f64::from(frame.step_adu),
         }
+    }
+
+    /// A level below which a pixel sees no sky, where a part of the frame is darker than the rest.
+    fn unlit_adu(&self) -> f64 {
+        const SHARE: f64 = 0.3;
+        const SIGMAS: f64 = 5.0;
+        self.least + SHARE * (self.median - self.least) - SIGMAS * self.noise
     }
 
     /// Whether it is as bright as exposures by day are.
@@ -210,8 +217,9 @@ fn is_trailed(frame: &Frame, light: &Light) -> bool {
     const MIN_LINES: usize = 50;
     const SHARE: f64 = 0.6;
     let limit = (SIGMAS * light.noise.max(0.5 * light.step)) as f32;
+    let unlit = light.unlit_adu();
     let (mut lines, mut all) = (0, 0);
-    let margin = AROUND + 1;
+    let margin = FROM_RIM.max(AROUND + 1);
     for y in (margin..frame.height.saturating_sub(margin)).step_by(3) {
         for x in margin..frame.width.saturating_sub(margin) {
             let own = frame.at(x, y);
@@ -219,13 +227,32 @@ fn is_trailed(frame: &Frame, light: &Light) -> bool {
                 let sides = [frame.at(x - dx, y - dy), frame.at(x + dx, y + dy)];
                 sides.iter().all(|side| own - side > limit)
             };
-            if [[5, 0], [0, 5], [4, 4]].into_iter().any(is_narrow) && is_peak(frame, x, y) {
+            if [[5, 0], [0, 5], [4, 4]].into_iter().any(is_narrow)
+                && is_peak(frame, x, y)
+                && !is_at_rim(frame, [x, y], unlit)
+            {
                 all += 1;
                 lines += usize::from(coherence(frame, [x, y], AROUND) > COHERENT);
             }
         }
     }
     lines >= MIN_LINES && lines as f64 > SHARE * f64::from(all)
+}
+
+/// How far from the rim of the lens's circle lines count, in pixels.
+const FROM_RIM: usize = 16;
+
+/// Whether one of the places around is darker than the sky: the sky's bright rim at the horizon is a line, too.
+fn is_at_rim(frame: &Frame, [x, y]: [usize; 2], unlit_adu: f64) -> bool {
+    let around = [
+        [x - FROM_RIM, y],
+        [x + FROM_RIM, y],
+        [x, y - FROM_RIM],
+        [x, y + FROM_RIM],
+    ];
+    around
+        .iter()
+        .any(|[x, y]| f64::from(frame.at(*x, *y)) < unlit_adu)
 }
 
 /// Whether no neighbor is brighter along one of the axes.
@@ -300,6 +327,12 @@ mod tests {
         assert!(!told(&frame(stars)));
         assert!(told(&frame(trails)));
         assert!(!told(&frame(|x, y| circle(x, y, 60.0))));
+        // A clouded sky with a bright rim, as above the horizon.
+        let rim = |x: f64, y: f64| {
+            let inward = 115.0 - libm::hypot(x - 120.0, y - 120.0);
+            circle(x, y, 40.0 + 150.0 * libm::exp(-inward / 3.0))
+        };
+        assert!(!told(&frame(rim)));
         assert!(!told(&frame(|_, _| 10.0)));
     }
 

@@ -3,6 +3,7 @@
 use crate::common::disk::SmallDisk;
 use crate::common::{Ran, fixture, names, number, orion, shared_dir, starpipe};
 use image::{GrayImage, Luma};
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -276,8 +277,10 @@ fn a_directory_that_takes_no_files_is_named_and_the_result_is_still_printed() {
     };
     let ran = process(disk.path(), &orion());
     assert_eq!(ran.status, 1, "{}", ran.stderr);
-    assert!(ran.stderr.contains("orion.json"), "{}", ran.stderr);
-    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    for name in ["orion.json", "orion.csv", "orion.wcs", "orion.png"] {
+        assert!(ran.stderr.contains(name), "{name}: {}", ran.stderr);
+    }
+    assert_eq!(ran.stderr.lines().count(), 4, "{}", ran.stderr);
     assert_eq!(ran.reports()[0]["status"], "identified");
 }
 
@@ -290,12 +293,16 @@ fn a_full_disk_is_named_and_holds_nothing_half_written() {
     let ran = process(disk.path(), &orion());
     assert_eq!(ran.status, 1, "{}", ran.stderr);
     assert!(
-        ran.stderr.contains("writing") && ran.stderr.contains("orion."),
+        ran.stderr.contains("writing") && ran.stderr.contains("orion.png"),
         "{}",
         ran.stderr
     );
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
-    assert_eq!(names(disk.path()), [""; 0]);
+    // What has space is whole.
+    assert_eq!(names(disk.path()), ["orion.csv", "orion.json", "orion.wcs"]);
+    let json = fs::read_to_string(disk.path().join("orion.json")).unwrap();
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(report["status"], "identified");
 }
 
 #[test]

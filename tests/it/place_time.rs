@@ -1,16 +1,21 @@
 //! A wrong site or time is noticed, and what is proposed would put it right; right ones are not accused.
 
 use crate::common::{Ran, sky, starpipe};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
 use starpipe::camera::Projection;
 use starpipe::identify::{DateSource, DateZone, FrameDate, Photometry};
 use starpipe::pipeline::{Change, Contradiction, ListedCentroid, Note, PlaceTime};
 use starpipe::sky::places::StarPlaces;
 use starpipe::{
-    CameraModel, CentroidList, Context, ObservationDate, Rotation, Site, Solution, UnitVector,
-    UtcOffset, Workspace, solve_centroids,
+    CameraModel, CentroidList, Context, ObservationDate, PixelPoint, Rotation, Site, Solution,
+    UnitVector, UtcOffset, Workspace, solve_centroids,
 };
 
 const SIDE_PX: f64 = 1000.0;
+/// Error of the centroids on each axis.
+const SIGMA_PX: f64 = 0.1;
 /// North and east, and a night of summer.
 const SITE: [f64; 3] = [44.0, 11.0, 300.0];
 const DATE: &str = "2023-07-18T22:40:00Z";
@@ -23,6 +28,8 @@ fn site([lat_deg, lon_deg, height_m]: [f64; 3]) -> Site {
 fn all_sky() -> CentroidList {
     let places = StarPlaces::at(&DATE.parse().unwrap(), Some(site(SITE)), None);
     let zenith = *places.zenith().unwrap();
+    let noise = Normal::new(0.0, SIGMA_PX).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(1);
     let lens = CameraModel::pinhole(SIDE_PX, SIDE_PX, SIDE_PX / 3.2, false);
     let lens = lens.with_projection(Projection::Equidistant);
     let attitude = Rotation::looking_at(&zenith, 0.7);
@@ -35,8 +42,9 @@ fn all_sky() -> CentroidList {
         let apparent = places.of(star);
         let pixel = lens.pixel_of(&attitude.apply(&apparent))?;
         let is_high = apparent.dot(&zenith) > 0.05;
-        let mut listed = ListedCentroid::new(pixel, f64::from(star.v_mag));
-        listed.sigma_px = Some(0.1);
+        let [x, y] = [pixel.x, pixel.y].map(|at| at + noise.sample(&mut random));
+        let mut listed = ListedCentroid::new(PixelPoint::new(x, y), f64::from(star.v_mag));
+        listed.sigma_px = Some(SIGMA_PX);
         is_high.then_some(listed)
     });
     CentroidList {
