@@ -15,11 +15,10 @@ import pathlib
 import subprocess
 import sys
 
+import all_sky
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
-
-import all_sky
 
 RIGHT_ARCSEC = 7200
 AXES = ("x", "y", "roll")

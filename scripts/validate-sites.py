@@ -17,13 +17,12 @@ import pathlib
 import subprocess
 import tempfile
 
+import all_sky
 import numpy as np
 from astropy import units as u
 from astropy.coordinates import AltAz, EarthLocation, SkyCoord, get_sun
 from astropy.time import Time
 from astropy.utils import iers
-
-import all_sky
 
 iers.conf.auto_download = False
 SIZE = 1000
@@ -96,7 +95,7 @@ class Sky:
             site = f"--site={lat:.4f},{lon:.4f},{self.height:.0f}"
             size = f"--width={SIZE}", f"--height={SIZE}"
             command = [program, "identify", "--format", "json", site, f"--date={date.isoformat()}Z", *size, path]
-            return json.loads(subprocess.run(command, capture_output=True, text=True).stdout)
+            return json.loads(subprocess.run(command, check=False, capture_output=True, text=True).stdout)
 
 
 def zenith(lat, lon, date):

@@ -13,9 +13,8 @@ import json
 import pathlib
 import subprocess
 
-import numpy as np
-
 import all_sky
+import numpy as np
 
 TONES = ("gamma", "srgb", "stretched")
 LOWEST_DEG = 10

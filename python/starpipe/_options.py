@@ -52,7 +52,8 @@ class SolveOptions(TypedDict, total=False):
     date : Time, datetime or str
         When the frame was taken, in UTC. By default of the header or the file's name.
     utc_offset : Quantity, float or "auto"
-        How many hours local times are ahead of UTC: those in names of files and in Exif, unless they say.
+        How many hours local times are ahead of UTC: those in names of files and in Exif, unless
+        they say.
         "auto" finds it by the stars over `site`.
     site : EarthLocation or (latitude, longitude[, height])
         Where it was taken, in degrees and metres.

@@ -142,9 +142,9 @@ class Pipeline:
         x, y : array
             Positions in pixels: (0, 0) is the centre of the first pixel.
         shape : (int, int), optional
-            Rows and columns of the frame; those of the pipeline's camera by default. Without a camera the
-            frame is as large as the centroids reach, `notes` tell of it, and the errors have that the
-            frame's centre is not known.
+            Rows and columns of the frame; those of the pipeline's camera by default. Without a
+            camera the frame is as large as the centroids reach, `notes` tell of it, and the
+            errors have that the frame's centre is not known.
         flux, mag : array, optional
             Brightness, linear or in magnitudes: one of them. Without it the positions are in order
             of brightness.
