@@ -97,7 +97,7 @@ def test_the_shape_of_a_list_is_the_cameras_or_guessed(pipeline, frame, result):
     found = with_camera.identify(x, y, flux=flux)
     assert (found.to_dict()["height"], found.to_dict()["width"]) == (384, 512)
     assert found == with_camera.identify(x, y, flux=flux, shape=(384, 512))
-    with pytest.raises(ValueError, match="512 . 384"):
+    with pytest.raises(ValueError, match=r"512 . 384"):
         with_camera.identify(x, y, flux=flux, shape=(384, 500))
     with pytest.raises(ValueError, match="outside the frame"):
         pipeline.identify(x, y, flux=flux, shape=(384, 400))
