@@ -3,9 +3,9 @@
 //! Bright stars, their light within rings over that of the fit → [`FluxScale`]
 //!
 //! A fit reaches to where a Gaussian ends. Turbulence, diffraction and scattered light put some percent of a
-//! star's light farther out, which no fit of its core can tell. Spots with sharp edges, as of stars out of focus,
-//! have less light than a Gaussian that is fitted to them. The correction is the same for all stars of a frame,
-//! as in aperture photometry (Howell 1989, PASP 101, 616).
+//! star's light farther out, which no fit of its core can tell. The correction is the same for all stars of a frame,
+//! as in aperture photometry (Howell 1989, PASP 101, 616). Spots with sharp edges, as of stars out of focus,
+//! have less light than a Gaussian that is fitted to them: that differs from star to star, and is in the error.
 //!
 //! 1. The light within four standard deviations of the spot is summed up, where a Gaussian ends, and that in three
 //!    rings beyond, each twice as large as the one before.
@@ -39,6 +39,8 @@ const MIN_STARS: usize = 3;
 const MAX_OTHERS: usize = 16;
 /// Smallest share of the light that is corrected: below, the spot is as good as its model.
 const MIN_SHARE: f64 = 0.02;
+/// Its significance, as a normal deviate.
+const SIGNIFICANT_SIGMAS: f64 = 5.0;
 /// Shares of the light that wings may have, all as likely before they are measured.
 const LIKELY_SHARES: [f64; 2] = [-0.05, 0.20];
 /// Beyond these shares what was measured are no wings: the background around the stars, or a spot that is not theirs.
@@ -101,8 +103,7 @@ impl FluxScale {
         // The probabilities of what was measured, without wings and with any.
         let without = (1.0 - LIKELY_FRAMES) * normal_density(value / sigma) / sigma;
         let with = LIKELY_FRAMES / (most - least);
-        let is_likely = with > without;
-        if is_likely && value.abs() > MIN_SHARE {
+        if with > without && value > MIN_SHARE.max(SIGNIFICANT_SIGMAS * sigma) {
             return Self {
                 wings: Some(Wings {
                     share: value,

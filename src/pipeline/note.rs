@@ -586,18 +586,11 @@ fn write_columns(f: &mut fmt::Formatter<'_>, columns: &[usize]) -> fmt::Result {
 }
 
 fn write_wings(f: &mut fmt::Formatter<'_>, wings: &Wings) -> fmt::Result {
-    let (percent, sigma_percent) = (100.0 * wings.share.abs(), 100.0 * wings.sigma);
-    if wings.share > 0.0 {
-        write!(
-            f,
-            "the stars have wings: {percent:.1} ± {sigma_percent:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes"
-        )
-    } else {
-        write!(
-            f,
-            "the edges of the stars are sharper than those of the spots fitted to them, as out of focus: these have {percent:.1} ± {sigma_percent:.1} % too much light, which is taken off the fluxes"
-        )
-    }
+    let (percent, sigma_percent) = (100.0 * wings.share, 100.0 * wings.sigma);
+    write!(
+        f,
+        "the stars have wings: {percent:.1} ± {sigma_percent:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes"
+    )
 }
 
 fn write_lines(f: &mut fmt::Formatter<'_>, trails: &[Trail]) -> fmt::Result {

@@ -116,6 +116,7 @@ mod tests {
         assert!((well_told.ln_ratio - 0.69).abs() < 0.05, "{well_told:?}");
         assert!(well_told.sigma < 0.05, "{well_told:?}");
         let untold = found(10.0, 40);
-        assert!(untold.sigma > 0.5, "{untold:?}");
+        // Shares above one are ruled out, and nothing else.
+        assert!(untold.sigma > 0.4, "{untold:?}");
     }
 }
