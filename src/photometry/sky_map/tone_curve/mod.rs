@@ -33,6 +33,8 @@ use black::Black;
 use curve::ToneCurve;
 use spot::{LitSpot, Spot};
 
+/// The golden ratio: parts of a row by its multiples are even over the row, and over each part of it.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Curves that stand for all that fit.
 const SAMPLES: usize = 48;
 /// Largest error of a brightness that is worth stating, in magnitudes.
@@ -212,18 +214,18 @@ impl CurvedFrame<'_, '_> {
         // The brightest bend most.
         chosen.sort_by(|a, b| a.v_mag().total_cmp(&b.v_mag()));
         chosen.truncate(MOST);
+        Spot::deviate(&mut chosen);
         chosen
     }
 
     /// The mean brightness by `curves`, with a further error.
     fn by(&self, curves: &[FittedCurve], black: &Black, further_mag: f64) -> Option<Curved> {
-        /// The golden ratio: levels without light are even over all curves, and over each kind of them.
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let sky_adu = self.levels.median_adu()?;
         let chosen = sampled(curves);
         let mut cells: Vec<Mean> = Vec::new();
         let (mut zenith, mut exponent) = (Mean::default(), Mean::default());
         for (at, fitted) in chosen.iter().enumerate() {
+            // Levels without light are even over all curves, and over each kind of them.
             let probability = ((at as f64 + 0.5) * GOLDEN).fract();
             let curve = &fitted.curve;
             let dark = black.light(curve, probability, sky_adu);

@@ -1,7 +1,11 @@
 //! The light of a star, by each tone curve that a picture may have.
+//!
+//! A curve that bends more gives the brightest pixels more weight, so that its sums have less of the noise of the
+//! others. So that this does not make it likelier, all have the noise of the sum of levels: what is missing is added.
 
+use super::GOLDEN;
 use super::curve::ToneCurve;
-use crate::base::statistics::{SIGMA_PER_MAD, median};
+use crate::base::statistics::{SIGMA_PER_MAD, median, normal_quantile};
 use crate::detect::Detections;
 use crate::frame::Frame;
 use crate::photometry::sky_map::stars::SkyStar;
@@ -15,6 +19,8 @@ pub(super) struct Spot {
     around_adu: Vec<f64>,
     /// Fluxes over light: what neighbors add, what the lens takes, and the exposure.
     flux_per_light: f64,
+    /// The noise that is added, over its standard deviation.
+    deviate: f64,
 }
 
 /// A star by a tone curve.
@@ -82,7 +88,15 @@ impl Spot {
             levels_adu,
             around_adu,
             flux_per_light,
+            deviate: 0.0,
         })
+    }
+
+    /// Gives spots that are sorted the noise that is added: it has no trend along them.
+    pub fn deviate(spots: &mut [Self]) {
+        for (at, spot) in spots.iter_mut().enumerate() {
+            spot.deviate = normal_quantile(((at as f64 + 0.5) * GOLDEN).fract());
+        }
     }
 
     /// V magnitude of the star.
@@ -95,23 +109,30 @@ impl Spot {
         let count = self.levels_adu.len() as f64;
         let around: Vec<f64> = self.around_adu.iter().map(|at| curve.light(*at)).collect();
         let (sky, variance) = mean_and_variance(&around);
-        let (sky_adu, _) = mean_and_variance(&self.around_adu);
+        let (sky_adu, variance_adu) = mean_and_variance(&self.around_adu);
         let (mut light, mut flux_adu, mut response_adu) = (0.0, 0.0, 0.0);
+        let mut noise2 = variance * count.powi(2) / around.len() as f64;
         for level_adu in &self.levels_adu {
             let over = curve.light(*level_adu) - sky;
+            // Noise makes pixels darker than the sky.
+            let light_per_adu = curve.light_per_adu(level_adu.max(sky_adu));
             light += over;
             flux_adu += level_adu - sky_adu;
-            // Noise makes pixels darker than the sky.
-            response_adu += over / curve.light_per_adu(level_adu.max(sky_adu));
+            response_adu += over / light_per_adu;
+            noise2 += variance_adu * light_per_adu.powi(2);
         }
-        let noise = (variance * count * (1.0 + count / around.len() as f64)).sqrt();
         let response = response_adu / flux_adu;
         let is_seen = light > 0.0 && flux_adu > 0.0 && response > 0.0 && response.is_finite();
+        let noise_adu = (variance_adu * count * (1.0 + count / around.len() as f64)).sqrt();
+        let relative = noise2.sqrt() / light;
+        let relative_by_levels = (noise_adu / (flux_adu * response)).max(relative);
+        let added = self.deviate * (relative_by_levels.powi(2) - relative.powi(2)).sqrt();
         is_seen.then(|| LitSpot {
             star: SkyStar {
                 measured: Some(Measured {
-                    instrumental_mag: instrumental_mag(light * self.flux_per_light),
-                    sigma_mag: MAG_PER_RELATIVE * noise / light,
+                    instrumental_mag: instrumental_mag(light * self.flux_per_light)
+                        + MAG_PER_RELATIVE * added,
+                    sigma_mag: MAG_PER_RELATIVE * relative_by_levels,
                 }),
                 ..self.star
             },
