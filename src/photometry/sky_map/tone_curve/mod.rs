@@ -181,12 +181,14 @@ impl CurvedFrame<'_, '_> {
     }
 
     /// The stars that are well enough measured to tell the curve. A choice by what they should be prefers none
-    /// that noise makes brighter.
+    /// that noise makes brighter, or dimmer.
     fn spots(&self, white_adu: f64) -> Vec<Spot> {
         const WANTED: usize = 30;
         const MOST: usize = 160;
         /// Those with larger errors are seen where noise makes them brighter.
         const LARGEST_SIGMAS_MAG: [f64; 2] = [0.06, 0.1];
+        /// Brighter ones are whole only where noise makes them dimmer. Over white.
+        const BRIGHTEST_PEAK: f64 = 0.8;
         let frame = self.frame;
         let reach_px = spot::reach_px(frame.detections);
         let to = |largest_mag: f64| -> Vec<Spot> {
@@ -199,7 +201,10 @@ impl CurvedFrame<'_, '_> {
                     * frame.lens_transmission(&star.pixel)
                     * frame.exposure_s.unwrap_or(1.0);
                 let picture = self.picture.frame;
-                Spot::of(picture, star, reach_px, white_adu, 1.0 / light_per_flux)
+                let spot = Spot::of(picture, star, reach_px, white_adu, 1.0 / light_per_flux)?;
+                let light_adu = libm::pow(10.0, -0.4 * self.clear_sky.instrumental_mag(star));
+                let peak_adu = spot.peak_adu(light_adu, frame.detections.spot_sigma_px);
+                (peak_adu < BRIGHTEST_PEAK * white_adu).then_some(spot)
             };
             self.stars
                 .iter()

@@ -99,6 +99,18 @@ impl Spot {
         }
     }
 
+    /// The level of its brightest pixel that is expected for light of this flux in levels.
+    pub fn peak_adu(&self, light_adu: f64, spot_sigma_px: f64) -> f64 {
+        let share = |at: f64| {
+            let off_px = at - at.round();
+            let part = |end: f64| libm::erf((end - off_px) / (spot_sigma_px * 2.0_f64.sqrt()));
+            0.5 * (part(0.5) - part(-0.5))
+        };
+        let [x, y] = self.star.seen_at.map_or([0.0; 2], |at| [at.x, at.y]);
+        let (sky_adu, _) = mean_and_variance(&self.around_adu);
+        sky_adu + light_adu / self.flux_per_light * share(x) * share(y)
+    }
+
     /// V magnitude of the star.
     pub fn v_mag(&self) -> f64 {
         self.star.v_mag
