@@ -183,10 +183,10 @@ impl CurvedFrame<'_, '_> {
     /// The stars that are well enough measured to tell the curve. A choice by what they should be prefers none
     /// that noise makes brighter, or dimmer.
     fn spots(&self, white_adu: f64) -> Vec<Spot> {
-        const WANTED: usize = 30;
+        const WANTED: usize = 80;
         const MOST: usize = 160;
         /// Those with larger errors are seen where noise makes them brighter.
-        const LARGEST_SIGMAS_MAG: [f64; 2] = [0.06, 0.1];
+        const LARGEST_SIGMAS_MAG: [f64; 3] = [0.06, 0.1, 0.15];
         /// Brighter ones are whole only where noise makes them dimmer. Over white.
         const BRIGHTEST_PEAK: f64 = 0.8;
         let frame = self.frame;

@@ -33,8 +33,8 @@ pub(super) struct LitSpot {
 
 /// Within which distance of a star its light is summed, in pixels.
 pub(super) fn reach_px(detections: &Detections) -> f64 {
-    const SIGMAS: f64 = 3.0;
-    const PIXEL: f64 = 1.0;
+    const SIGMAS: f64 = 2.0;
+    const PIXEL: f64 = 0.5;
     let widest_px = detections.psf.map_or(0.0, |psf| psf.sigma_range_px[1]);
     let trail_px = detections.trails.map_or(0.0, |trails| trails.length_px);
     SIGMAS * detections.spot_sigma_px.max(widest_px) + PIXEL + 0.5 * trail_px
