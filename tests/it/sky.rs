@@ -370,7 +370,7 @@ fn a_jpeg_with_a_tone_curve_has_a_brightness_with_its_error() {
         let mag = number(&found, "/zenith/mag_arcsec2");
         let sigma = number(&found, "/zenith/sigma_mag");
         let off = (mag - SKY_MAG).abs();
-        assert!(sigma < 0.7 && off < 2.5 * sigma, "{gamma}: {mag} ± {sigma}");
+        assert!(sigma < 0.7 && off < 2.0 * sigma, "{gamma}: {mag} ± {sigma}");
         assert!(number(&found, "/tone_curve/exponent") < 0.9);
     }
 }

@@ -39,9 +39,6 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 const SAMPLES: usize = 48;
 /// Largest error of a brightness that is worth stating, in magnitudes.
 const LARGEST_SIGMA_MAG: f64 = 0.7;
-/// Error of a brightness by a tone curve beyond how much the curves differ, in magnitudes: real curves are of no such
-/// family, and spots in JPEG files are not those of the model.
-const CURVE_SIGMA_MAG: f64 = 0.2;
 
 /// How gray levels go with light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,7 +113,7 @@ impl CurvedFrame<'_, '_> {
             ln_likelihood: 0.0,
             ln_weight: 0.0,
         };
-        let curved = self.by(&[linear], &self.black()?, 0.0)?;
+        let curved = self.by(&[linear], &self.black()?)?;
         Some(Curved {
             tone: None,
             ..curved
@@ -134,7 +131,7 @@ impl CurvedFrame<'_, '_> {
         };
         let evidence = CurveEvidence(fitted.iter().map(ln_likelihood).collect());
         let fitted: Vec<FittedCurve> = fitted.into_iter().flatten().collect();
-        let curved = self.by(&fitted, &black, CURVE_SIGMA_MAG)?;
+        let curved = self.by(&fitted, &black)?;
         Some(Curved {
             evidence: Some(evidence),
             ..curved
@@ -223,8 +220,8 @@ impl CurvedFrame<'_, '_> {
         chosen
     }
 
-    /// The mean brightness by `curves`, with a further error.
-    fn by(&self, curves: &[FittedCurve], black: &Black, further_mag: f64) -> Option<Curved> {
+    /// The mean brightness by `curves`.
+    fn by(&self, curves: &[FittedCurve], black: &Black) -> Option<Curved> {
         let sky_adu = self.levels.median_adu()?;
         let chosen = sampled(curves);
         let mut cells: Vec<Mean> = Vec::new();
@@ -248,7 +245,7 @@ impl CurvedFrame<'_, '_> {
                 sigma: 0.0,
             });
         }
-        let light = |mean: &Mean| mean.light(chosen.len(), further_mag);
+        let light = |mean: &Mean| mean.light(chosen.len());
         let cells: Vec<Option<SkyLight>> = cells.iter().map(light).collect();
         let zenith = light(&zenith).map(ZenithSky::of);
         let is_known = zenith.is_some() || cells.iter().any(Option::is_some);
@@ -347,15 +344,12 @@ impl Mean {
         })
     }
 
-    /// The mean brightness with a further error, where curves and levels without light leave it open by little
+    /// The mean brightness, where curves and levels without light leave it open by little
     /// enough to be of use.
-    fn light(&self, expected: usize, further_mag: f64) -> Option<SkyLight> {
+    fn light(&self, expected: usize) -> Option<SkyLight> {
         let mag_arcsec2 = self.estimate(expected)?;
         (mag_arcsec2.sigma < LARGEST_SIGMA_MAG).then(|| SkyLight {
-            mag_arcsec2: Estimate {
-                sigma: libm::hypot(mag_arcsec2.sigma, further_mag),
-                ..mag_arcsec2
-            },
+            mag_arcsec2,
             bv_mag: None,
             luminance_cd_m2: SkyBrightness::MagArcsec2(mag_arcsec2.value).luminance_cd_m2(),
         })
