@@ -13,10 +13,12 @@ What an option does not give is random.
 """
 
 import argparse
+import functools
 import gzip
 import json
 import math
 import pathlib
+import subprocess
 
 import numpy as np
 from PIL import Image
@@ -527,15 +529,54 @@ def parser():
     return options
 
 
+def comparison(description, seed):
+    """The arguments of a script that compares frames with their truth."""
+    options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("program", type=lambda path: pathlib.Path(path).resolve())
+    options.add_argument("catalog", type=pathlib.Path)
+    options.add_argument("directory", type=pathlib.Path)
+    options.add_argument("--frames", type=int, default=100)
+    options.add_argument("--seed", type=int, default=seed)
+    return options
+
+
+@functools.cache
+def catalog_of(path):
+    """The catalog, read once, for places without data from the network."""
+    from astropy.utils import iers
+
+    iers.conf.auto_download = False
+    return read_catalog(path)
+
+
+def frame_of(options, seed, words):
+    """Draws a frame into the directory of a comparison, unless it is there; returns file, truth and maps."""
+    path = options.directory / f"{seed}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    there = [path.with_suffix(end) for end in (".fits", ".png", ".jpg") if path.with_suffix(end).exists()]
+    if not there:
+        there = [write(path, *drawn(catalog_of(options.catalog), parser().parse_args(["--seed", str(seed), *words])))]
+    return there[0], json.loads(path.with_suffix(".json").read_text(encoding="utf-8")), np.load(path.with_suffix(".npz"))
+
+
+def answer(options, frame, truth, *arguments):
+    """The JSON of `starpipe sky` with date and site, which is kept beside the frame."""
+    site = ",".join(map(str, truth["site"]))
+    command = [options.program, "sky", "--format=json", f"--site={site}", f"--date={truth['date']}", *arguments, frame]
+    ran = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    if ran.returncode not in (0, 3):
+        raise SystemExit(f"{frame}: {ran.stderr}")
+    found = json.loads(ran.stdout.splitlines()[0])
+    frame.with_suffix(".answer.json").write_text(json.dumps(found), encoding="utf-8")
+    return found
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__, parents=[parser()], formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("catalog", type=pathlib.Path)
     options.add_argument("out", type=pathlib.Path)
     options = options.parse_args()
-    from astropy.utils import iers
-
-    iers.conf.auto_download = False
-    print(write(options.out, *drawn(read_catalog(options.catalog), options)))
+    print(write(options.out, *drawn(catalog_of(options.catalog), options)))
 
 
 if __name__ == "__main__":

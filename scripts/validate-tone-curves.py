@@ -8,72 +8,11 @@ compressed at a quality of 75 to 95. DIR keeps frames, truth, and answers; frame
 Errors are measured minus true, in magnitudes, and over the stated ones.
 """
 
-import argparse
-import json
-import pathlib
-import subprocess
-
 import all_sky
+import all_sky_maps
 import numpy as np
 
 TONES = ("gamma", "srgb", "stretched")
-LOWEST_DEG = 10
-METER_DEG, METER_REACH_DEG, MOON_REACH_DEG = 20, 30, 10
-
-
-def draw(catalog, path, seed, arguments):
-    """Draws a frame, unless it is there."""
-    frame = path.with_suffix(".jpg")
-    if not frame.exists():
-        words = ["--seed", str(seed), "--bits", "8", "--tone", TONES[seed % 3], "--jpeg", str(75 + 5 * (seed // 3 % 5))]
-        options = all_sky.parser().parse_args([*words, *arguments])
-        all_sky.write(path, *all_sky.drawn(catalog(), options))
-    return frame
-
-
-def answer(program, frame, truth):
-    """The JSON of `starpipe sky`."""
-    site = ",".join(map(str, truth["site"]))
-    command = [program, "sky", "--format=json", f"--site={site}", f"--date={truth['date']}", f"--exposure={truth['exposure_s']}", frame]
-    ran = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-    if ran.returncode not in (0, 3):
-        raise SystemExit(f"{frame}: {ran.stderr}")
-    return json.loads(ran.stdout.splitlines()[0])
-
-
-def mean_mag(mags, weights=None):
-    """Magnitude of the mean light."""
-    return -2.5 * np.log10(np.average(10 ** (-0.4 * mags), weights=weights))
-
-
-def off_moon(truth, maps):
-    """Where a meter at the zenith measures."""
-    if truth["moon_direction"] is None:
-        return True
-    altitude, azimuth = np.radians(maps["altitude_deg"]), np.radians(maps["azimuth_deg"])
-    directions = np.stack([np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)], axis=-1)
-    return np.degrees(np.arccos(np.clip(directions @ np.array(truth["moon_direction"]), -1, 1))) > MOON_REACH_DEG
-
-
-def true_zenith(truth, maps):
-    """What a meter sees there."""
-    angle = 90 - maps["altitude_deg"]
-    seen = (angle < METER_REACH_DEG) & np.isfinite(maps["mag_arcsec2"]) & off_moon(truth, maps)
-    return mean_mag(maps["mag_arcsec2"][seen], np.exp(-4 * np.log(2) * (angle[seen] / METER_DEG) ** 2))
-
-
-def cell_errors(sky, maps):
-    """Errors of cells above LOWEST_DEG whose sky is in the frame, and the stated ones."""
-    mags, altitude, azimuth = maps["mag_arcsec2"], maps["altitude_deg"], maps["azimuth_deg"]
-    errors = []
-    for cell in sky["cells"]:
-        if cell["mag_arcsec2"] is None or cell["altitude_deg"] is None or cell["altitude_deg"][0] < LOWEST_DEG:
-            continue
-        (low, high), (first, last) = cell["altitude_deg"], cell["azimuth_deg"]
-        inside = (altitude >= low) & (altitude < high) & (azimuth >= first) & (azimuth < last)
-        if np.isfinite(mags[inside]).mean() > 0.9:
-            errors.append((cell["mag_arcsec2"] - mean_mag(mags[inside][np.isfinite(mags[inside])]), cell["sigma_mag"]))
-    return errors
 
 
 def summary(errors):
@@ -87,32 +26,14 @@ def summary(errors):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program", type=pathlib.Path)
-    parser.add_argument("catalog", type=pathlib.Path)
-    parser.add_argument("directory", type=pathlib.Path)
-    parser.add_argument("--frames", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=5000)
+    parser = all_sky.comparison(__doc__, 5000)
     parser.add_argument("--draw", action="append", default=[], help="one more argument of scripts/all_sky.py")
     options = parser.parse_args()
-    options.directory.mkdir(parents=True, exist_ok=True)
-    from astropy.utils import iers
-
-    iers.conf.auto_download = False
-    stars = []
-
-    def catalog():
-        if not stars:
-            stars.append(all_sky.read_catalog(options.catalog))
-        return stars[0]
-
     zeniths, cells, withheld, unknown = {}, {}, [], 0
     for seed in range(options.seed, options.seed + options.frames):
-        path = options.directory / f"{seed}"
-        frame = draw(catalog, path, seed, options.draw)
-        truth, maps = json.loads(path.with_suffix(".json").read_text(encoding="utf-8")), np.load(path.with_suffix(".npz"))
-        found = answer(options.program.resolve(), frame, truth)
-        path.with_suffix(".answer.json").write_text(json.dumps(found), encoding="utf-8")
+        words = ["--bits", "8", "--tone", TONES[seed % 3], "--jpeg", str(75 + 5 * (seed // 3 % 5)), *options.draw]
+        frame, truth, maps = all_sky.frame_of(options, seed, words)
+        found = all_sky.answer(options, frame, truth, f"--exposure={truth['exposure_s']}")
         sky = found.get("sky")
         if found["status"] != "identified" or sky is None:
             unknown += 1
@@ -120,11 +41,11 @@ def main():
         if sky["no_brightness"]:
             withheld.append((seed, sky["no_brightness"]))
             continue
-        errors = cell_errors(sky, maps)
+        true = all_sky_maps.TrueSky(truth, maps)
+        errors = all_sky_maps.brightness(sky, true)
         cells.setdefault(truth["tone"], []).extend(errors)
         text = f"{seed} {truth['tone']} {truth.get('tone_parameter')}, {truth['unlit_level']:.1f} unlit"
-        if sky["zenith"]:
-            error = sky["zenith"]["mag_arcsec2"] - true_zenith(truth, maps), sky["zenith"]["sigma_mag"]
+        if error := all_sky_maps.zenith(sky, true):
             zeniths.setdefault(truth["tone"], []).append(error)
             text += f", zenith {sky['zenith']['mag_arcsec2']:.2f}: {error[0]:+.3f} ± {error[1]:.3f}"
         if errors:

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::archive::{Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter};
+use starpipe::archive::{self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter};
 use starpipe::base::table::FieldValue;
 use starpipe::report::{FrameReport, StarRow};
 use std::num::NonZeroUsize;
@@ -106,15 +106,13 @@ impl PartRows {
         self.tables()?.frames.add(row).map_err(exception)
     }
 
-    /// The files of frames and of stars.
-    fn finish<'py>(
-        &mut self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+    /// The files of frames and of stars, and of their checksums.
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<[Bound<'py, PyBytes>; 3]> {
         let Tables { frames, stars } = self.0.take().ok_or_else(finished)?;
         let frames = frames.finish().map_err(exception)?;
         let stars = stars.finish().map_err(exception)?;
-        Ok((PyBytes::new(py, &frames), PyBytes::new(py, &stars)))
+        let checksums = archive::checksums(&frames, &stars);
+        Ok([&frames[..], &stars, checksums.as_bytes()].map(|file| PyBytes::new(py, file)))
     }
 }
 

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 TABLES = ("frames.parquet", "stars.parquet")
 """Directories of the parts of the two tables."""
 
+CHECKSUMS = "checksums"
+"""Directory of the checksums of each part's tables."""
+
 TIME_LIMIT_S = 60.0
 """How long a frame may take by default."""
 
@@ -305,10 +308,12 @@ def _process_part(job: _Job, part: str, names: list[str]) -> dict[str, int]:
             else:
                 counted[status] += 1
     filesystem, root = _open(job.out, job.options)
-    frames, stars = rows.finish()
+    frames, stars, checksums = rows.finish()
+    sums = str(Path(part).with_suffix(".txt"))
     # A part is there when its table of frames is.
-    for table, file in ((TABLES[1], stars), (TABLES[0], frames)):
-        _write(filesystem, f"{root}/{table}/{part}", file)
+    files = ((CHECKSUMS, sums, checksums), (TABLES[1], part, stars), (TABLES[0], part, frames))
+    for directory, name, file in files:
+        _write(filesystem, f"{root}/{directory}/{name}", file)
     return dict(counted)
 
 

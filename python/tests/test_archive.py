@@ -42,10 +42,8 @@ def alone(night, tmp_path_factory):
 
 
 def tables(directory):
-    """Return all files, by name; the checksums that the program adds are not those of a cluster."""
-    found = [
-        path for path in directory.rglob("*") if path.is_file() and path.parent.name != "checksums"
-    ]
+    """Return all files, by name."""
+    found = [path for path in directory.rglob("*") if path.is_file()]
     return {str(path.relative_to(directory)): path.read_bytes() for path in found}
 
 

@@ -176,7 +176,8 @@ impl Archive {
         let is_whole = |table: &&str| {
             let path = self.table_of(table, part);
             match &checksums {
-                Ok(known) => checksum_line(table, &path).is_ok_and(|line| known.contains(&line)),
+                Ok(known) => FileHash::of_file(&path)
+                    .is_ok_and(|hash| known.contains(&checksum_line(table, hash))),
                 // Another program may have written it.
                 Err(_) => is_readable(&path),
             }
@@ -268,8 +269,8 @@ impl PartWriter {
         let frames = self.frames.written()?;
         let path = &self.checksums;
         let lines = || {
-            let stars = checksum_line(STARS, stars.file.path())?;
-            Ok(checksum_line(FRAMES, frames.file.path())? + &stars)
+            let hash = |table: &WrittenTable| FileHash::of_file(table.file.path());
+            Ok(checksum_lines(hash(&frames)?, hash(&stars)?))
         };
         let write = |lines: String| files::write(path, lines.as_bytes());
         let written = lines().and_then(write);
@@ -322,9 +323,20 @@ impl WrittenTable {
     }
 }
 
-/// The line of a table among the checksums of a part; its content is in the file `path`.
-fn checksum_line(table: &str, path: &Path) -> io::Result<String> {
-    Ok(format!("{table} {}\n", FileHash::of_file(path)?))
+/// The line of a table among the checksums of a part.
+fn checksum_line(table: &str, hash: FileHash) -> String {
+    format!("{table} {hash}\n")
+}
+
+/// The file of the checksums of a part.
+fn checksum_lines(frames: FileHash, stars: FileHash) -> String {
+    checksum_line(FRAMES, frames) + &checksum_line(STARS, stars)
+}
+
+/// The file of the checksums of a part, by the contents of its tables.
+#[doc(hidden)]
+pub fn checksums(frames: &[u8], stars: &[u8]) -> String {
+    checksum_lines(FileHash::of(frames), FileHash::of(stars))
 }
 
 /// Takes `directory` for a run by a file of this name in it. A damaged one is written anew if `is_own` says that
