@@ -11,7 +11,7 @@ use crate::base::files;
 use crate::base::table::Column;
 use crate::report::StarRow;
 use std::fs;
-use std::io::{self, ErrorKind, Write};
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
