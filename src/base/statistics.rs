@@ -20,6 +20,12 @@ pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
+/// Numbers from 0 to 1 that are even over any part of their row, by the golden ratio.
+pub fn even_part(index: usize) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    ((index as f64 + 0.5) * GOLDEN).fract()
+}
+
 /// The number of standard deviations below which a normal deviate is with `probability`; within ±8.
 pub fn normal_quantile(probability: f64) -> f64 {
     const END: f64 = 8.0;

@@ -89,13 +89,6 @@ impl ClearSky {
         Some((clear_sky, fitted.ln_posterior(&all, is_flat)))
     }
 
-    /// Error that a star's magnitude would have by its flux, if it were as bright as it should be.
-    pub(super) fn expected_sigma_mag(&self, star: &SkyStar) -> Option<f64> {
-        let measured = star.measured?;
-        let dimmer_mag = measured.instrumental_mag - self.instrumental_mag(star);
-        Some(measured.sigma_mag * libm::pow(10.0, -0.4 * dimmer_mag))
-    }
-
     fn by(fitted: &ClearFit, has_horizon: bool, mean_vmag: f64) -> Self {
         /// Part of what experience leaves open that a measured extinction leaves.
         const MEASURED: f64 = 0.5;

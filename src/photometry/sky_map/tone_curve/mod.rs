@@ -26,15 +26,13 @@ use super::curve_evidence::CurveEvidence;
 use super::dark_level::DarkLevel;
 use super::picture::Picture;
 use super::stars::SkyStar;
-use crate::base::statistics::Estimate;
+use crate::base::statistics::{Estimate, even_part};
 use crate::model::sensitivity::SkyBrightness;
 use crate::photometry::IdentifiedFrame;
 use black::Black;
 use curve::ToneCurve;
 use spot::{LitSpot, Spot};
 
-/// The golden ratio: parts of a row by its multiples are even over the row, and over each part of it.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Curves that stand for all that fit.
 const SAMPLES: usize = 48;
 /// Largest error of a brightness that is worth stating, in magnitudes.
@@ -188,31 +186,27 @@ impl CurvedFrame<'_, '_> {
         const BRIGHTEST_PEAK: f64 = 0.8;
         let frame = self.frame;
         let reach_px = spot::reach_px(frame.detections);
-        let to = |largest_mag: f64| -> Vec<Spot> {
-            let is_bright = |star: &&SkyStar| {
-                let sigma_mag = self.clear_sky.expected_sigma_mag(star);
-                sigma_mag.is_some_and(|sigma_mag| sigma_mag < largest_mag)
-            };
-            let spot = |star: &SkyStar| {
-                let light_per_flux = libm::pow(10.0, 0.4 * star.brighter_mag)
-                    * frame.lens_transmission(&star.pixel)
-                    * frame.exposure_s.unwrap_or(1.0);
-                let picture = self.picture.frame;
-                let spot = Spot::of(picture, star, reach_px, white_adu, 1.0 / light_per_flux)?;
-                let light_adu = libm::pow(10.0, -0.4 * self.clear_sky.instrumental_mag(star));
-                let peak_adu = spot.peak_adu(light_adu, frame.detections.spot_sigma_px);
-                (peak_adu < BRIGHTEST_PEAK * white_adu).then_some(spot)
-            };
-            self.stars
-                .iter()
-                .filter(is_bright)
-                .filter_map(spot)
-                .collect()
+        let spot = |star: &SkyStar| {
+            star.measured?;
+            let light_per_flux = libm::pow(10.0, 0.4 * star.brighter_mag)
+                * frame.lens_transmission(&star.pixel)
+                * frame.exposure_s.unwrap_or(1.0);
+            let flux = libm::pow(10.0, -0.4 * self.clear_sky.instrumental_mag(star));
+            let expected = (flux, 1.0 / light_per_flux);
+            let spot = Spot::of(self.picture.frame, star, (reach_px, white_adu), expected)?;
+            let peak_adu = spot.peak_adu(frame.detections.spot_sigma_px);
+            (peak_adu < BRIGHTEST_PEAK * white_adu).then_some(spot)
         };
-        let found = LARGEST_SIGMAS_MAG.map(to);
-        let enough = found.iter().position(|spots| spots.len() >= WANTED);
-        let chosen = enough.unwrap_or(found.len() - 1);
-        let mut chosen = found.into_iter().nth(chosen).unwrap_or_default();
+        let mut chosen: Vec<Spot> = self.stars.iter().filter_map(spot).collect();
+        let count = |largest_mag: f64| {
+            let is_bright = |spot: &&Spot| spot.sigma_mag() < largest_mag;
+            chosen.iter().filter(is_bright).count()
+        };
+        let [.., most_mag] = LARGEST_SIGMAS_MAG;
+        let enough = LARGEST_SIGMAS_MAG.into_iter();
+        let enough = enough.filter(|largest_mag| count(*largest_mag) >= WANTED);
+        let largest_mag = enough.fold(most_mag, f64::min);
+        chosen.retain(|spot| spot.sigma_mag() < largest_mag);
         // The brightest bend most.
         chosen.sort_by(|a, b| a.v_mag().total_cmp(&b.v_mag()));
         chosen.truncate(MOST);
@@ -228,7 +222,7 @@ impl CurvedFrame<'_, '_> {
         let (mut zenith, mut exponent) = (Mean::default(), Mean::default());
         for (at, fitted) in chosen.iter().enumerate() {
             // Levels without light are even over all curves, and over each kind of them.
-            let probability = ((at as f64 + 0.5) * GOLDEN).fract();
+            let probability = even_part(at);
             let curve = &fitted.curve;
             let dark = black.light(curve, probability, sky_adu);
             let light = self

@@ -3,9 +3,8 @@
 //! A curve that bends more gives the brightest pixels more weight, so that its sums have less of the noise of the
 //! others. So that this does not make it likelier, all have the noise of the sum of levels: what is missing is added.
 
-use super::GOLDEN;
 use super::curve::ToneCurve;
-use crate::base::statistics::{SIGMA_PER_MAD, median, normal_quantile};
+use crate::base::statistics::{SIGMA_PER_MAD, even_part, median, normal_quantile};
 use crate::detect::Detections;
 use crate::frame::Frame;
 use crate::photometry::sky_map::stars::SkyStar;
@@ -19,6 +18,8 @@ pub(super) struct Spot {
     around_adu: Vec<f64>,
     /// Fluxes over light: what neighbors add, what the lens takes, and the exposure.
     flux_per_light: f64,
+    /// Sum of its levels over the sky that is expected, in ADU.
+    expected_adu: f64,
     /// The noise that is added, over its standard deviation.
     deviate: f64,
 }
@@ -41,13 +42,12 @@ pub(super) fn reach_px(detections: &Detections) -> f64 {
 }
 
 impl Spot {
-    /// The pixels of `star`. `None` at the border, and where they come near to white.
+    /// The pixels of `star`, of which this flux is expected. `None` at the border, and where they come near to white.
     pub fn of(
         frame: &Frame,
         star: &SkyStar,
-        reach_px: f64,
-        white_adu: f64,
-        flux_per_light: f64,
+        (reach_px, white_adu): (f64, f64),
+        (flux, flux_per_light): (f64, f64),
     ) -> Option<Self> {
         /// Part of white at which colors of a pixel may be cut off.
         const BRIGHTEST: f64 = 0.9;
@@ -88,6 +88,7 @@ impl Spot {
             levels_adu,
             around_adu,
             flux_per_light,
+            expected_adu: flux / flux_per_light,
             deviate: 0.0,
         })
     }
@@ -95,12 +96,24 @@ impl Spot {
     /// Gives spots that are sorted the noise that is added: it has no trend along them.
     pub fn deviate(spots: &mut [Self]) {
         for (at, spot) in spots.iter_mut().enumerate() {
-            spot.deviate = normal_quantile(((at as f64 + 0.5) * GOLDEN).fract());
+            spot.deviate = normal_quantile(even_part(at));
         }
     }
 
-    /// The level of its brightest pixel that is expected for light of this flux in levels.
-    pub fn peak_adu(&self, light_adu: f64, spot_sigma_px: f64) -> f64 {
+    /// The error of its magnitude that is expected, by the noise of the sky around it.
+    pub fn sigma_mag(&self) -> f64 {
+        MAG_PER_RELATIVE * self.noise_adu() / self.expected_adu
+    }
+
+    /// The noise of the sum of its levels.
+    fn noise_adu(&self) -> f64 {
+        let count = self.levels_adu.len() as f64;
+        let (_, variance) = mean_and_variance(&self.around_adu);
+        (variance * count * (1.0 + count / self.around_adu.len() as f64)).sqrt()
+    }
+
+    /// The level that is expected of its brightest pixel.
+    pub fn peak_adu(&self, spot_sigma_px: f64) -> f64 {
         let share = |at: f64| {
             let off_px = at - at.round();
             let part = |end: f64| libm::erf((end - off_px) / (spot_sigma_px * 2.0_f64.sqrt()));
@@ -108,7 +121,7 @@ impl Spot {
         };
         let [x, y] = self.star.seen_at.map_or([0.0; 2], |at| [at.x, at.y]);
         let (sky_adu, _) = mean_and_variance(&self.around_adu);
-        sky_adu + light_adu / self.flux_per_light * share(x) * share(y)
+        sky_adu + self.expected_adu * share(x) * share(y)
     }
 
     /// V magnitude of the star.
@@ -135,9 +148,8 @@ impl Spot {
         }
         let response = response_adu / flux_adu;
         let is_seen = light > 0.0 && flux_adu > 0.0 && response > 0.0 && response.is_finite();
-        let noise_adu = (variance_adu * count * (1.0 + count / around.len() as f64)).sqrt();
         let relative = noise2.sqrt() / light;
-        let relative_by_levels = (noise_adu / (flux_adu * response)).max(relative);
+        let relative_by_levels = (self.noise_adu() / (flux_adu * response)).max(relative);
         let added = self.deviate * (relative_by_levels.powi(2) - relative.powi(2)).sqrt();
         is_seen.then(|| LitSpot {
             star: SkyStar {
