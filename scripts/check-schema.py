@@ -63,6 +63,10 @@ process: identify --pixel-scale 10 OUT/tables/orion.csv
 simulate: simulate --camera {ALL_SKY} --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/sky.tif
 process: sky --camera docs/start/all-sky.toml --site 47,8,500 OUT/sky.tif
 process: sky fixtures/orion/orion.png
+simulate: simulate --camera {ALL_SKY} --bits 8 --gain-e-per-adu 60 --date 2026-01-15T20:00Z --ra 62.805 --dec 46.929 --out OUT/curve.tif
+process: sky --site 47,8,500 OUT/curve.tif
+process: process --max-stars 20 fixtures/orion/orion.png
+process: process --date 2020-03-01T20:00Z --site 50,10,300 fixtures/cygnus/cygnus.tif
 simulate: simulate --preset imx174-35mm --ra 84 --dec 3 --date 2024-01-05T21:00Z --exposure 1 --seed 2 --trails 2 --trail-rate-deg-s 2 --trail-vmag 4 --out OUT/crossed.tif
 process: process --trails --site 50,10,300 OUT/crossed.tif
 {chr(10).join(night_frame(number) for number in range(8))}

@@ -38,6 +38,10 @@ const SAMPLES: usize = 48;
 /// Largest error of a brightness that is worth stating, in magnitudes.
 const LARGEST_SIGMA_MAG: f64 = 0.7;
 
+/// So many stars are independent at most: no curve here is the picture's to the last digit, and what it lacks they
+/// share.
+const INDEPENDENT_STARS: f64 = 40.0;
+
 /// How gray levels go with light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -157,13 +161,14 @@ impl CurvedFrame<'_, '_> {
             .picture
             .usual_curves
             .filter(|usual| usual.0.len() == curves.len());
+        let independent = (INDEPENDENT_STARS / spots.len().max(1) as f64).min(1.0);
         let fitted = curves.iter().enumerate().map(|(index, (curve, prior))| {
             let lit: Vec<LitSpot> = spots.iter().filter_map(|spot| spot.by(curve)).collect();
             let stars: Vec<SkyStar> = lit.iter().map(|lit| lit.star).collect();
             let (clear_sky, ln_posterior) = ClearSky::of_light(&stars, self.picture.is_flat)?;
             // Magnitudes of light scatter more than those of levels by a curve that compresses light.
             let ln_response: f64 = lit.iter().map(|lit| lit.ln_response).sum();
-            let ln_likelihood = ln_posterior - ln_response;
+            let ln_likelihood = (ln_posterior - ln_response) * independent;
             let ln_usual = usual.map_or(0.0, |usual| usual.0[index]);
             Some(FittedCurve {
                 curve: *curve,
