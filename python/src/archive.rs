@@ -8,7 +8,9 @@ use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::archive::{self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter};
+use starpipe::archive::{
+    self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
+};
 use starpipe::base::table::FieldValue;
 use starpipe::report::{FrameReport, StarRow};
 use std::num::NonZeroUsize;
