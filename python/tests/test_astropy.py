@@ -164,14 +164,14 @@ def test_astropys_objects_are_hints(pipeline, pixels, result):
         near=result.center.galactic,
         radius=120 * u.arcmin,
         date=Time("2020-03-01T20:00:00"),
-        # Cygnus is near the zenith there.
-        site=EarthLocation.from_geodetic(-155 * u.deg, 50 * u.deg, 300 * u.m),
+        # It is before dawn, and Cygnus is high.
+        site=EarthLocation.from_geodetic(132 * u.deg, 50 * u.deg, 300 * u.m),
         exposure=200 * u.ms,
     )
     report = found.to_dict()
     assert found and report["exposure_s"] == 0.2
     assert report["date"]["iso"].startswith("2020-03-01T20:00:00")
-    assert abs(report["observation"]["site"]["lon_deg"] + 155.0) < 1e-9
+    assert abs(report["observation"]["site"]["lon_deg"] - 132.0) < 1e-9
     assert found.center.separation(result.center) < 30 * u.arcsec
 
 
