@@ -90,4 +90,5 @@ def main():
         print(all_sky_maps.summary(cells, skies))
 
 
-main()
+if __name__ == "__main__":
+    main()
