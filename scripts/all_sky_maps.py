@@ -16,6 +16,8 @@ LOWEST_DEG = 10
 MIN_PIXELS = 4
 RING_DEG = 5
 CLEAR_MAG = 0.2
+# Stars with less light, in the noise of a pixel, and farther from detections than this are part of the sky.
+FAINTEST_SEEN, ALONE_PX = 20, 2.5
 METER_DEG, METER_REACH_DEG, MOON_REACH_DEG = 20, 30, 10
 # Width of the fall of completeness at one limit, in magnitudes.
 WIDTH_MAG = 0.3
@@ -44,10 +46,12 @@ class TrueSky:
         passed = 1 - truth["vignetting"] * off_axis**2
         rate = 10 ** (0.4 * truth["zero_point_e_s"]) * truth["exposure_s"]
         sky = rate * self.light * self.solid_angle * passed
-        gain = truth["gain_e_adu"]
-        variance = sky + truth["stray"] * np.nanmedian(sky) + truth["read_noise_e"] ** 2 + gain**2 / 12
+        # The size of a gray level.
+        step_e = truth["gain_e_adu"] * truth.get("full_adu", truth["largest_level"]) / truth["largest_level"]
+        variance = sky + truth["stray"] * np.nanmedian(sky) + truth["read_noise_e"] ** 2 + step_e**2 / 12
         self.noise_e = np.sqrt(variance)
         self.airmass = all_sky.airmass(np.radians(self.altitude_deg))
+        self.rate = rate * passed
         # V of a star of one standard deviation of a pixel's noise.
         self.noise_vmag = 2.5 * np.log10(rate * passed / self.noise_e) - truth["extinction_mag"] * self.airmass - self.cloud_mag
         self.smooth = [np.ones_like(off_axis), self.airmass, off_axis**2]
@@ -61,6 +65,18 @@ class TrueSky:
         if len(pixels[0]) < MIN_PIXELS:
             return None
         return -2.5 * math.log10(np.average(self.light[pixels], weights=self.solid_angle[pixels]))
+
+    def add_faint_stars(self, found):
+        """Adds the light of stars that are not detected: it is in the sky that a camera or a meter sees."""
+        size = len(self.shown)
+        places = np.c_[self.stars["x"], self.stars["y"]]
+        column, row = np.clip(np.round(places).astype(int), 0, size - 1).T
+        faint = self.stars["electrons"] < FAINTEST_SEEN * self.noise_e[row, column]
+        if found["stars"]:
+            detected = cKDTree([[star["x"], star["y"]] for star in found["stars"]])
+            faint &= detected.query(places)[0] > ALONE_PX
+        row, column = row[faint], column[faint]
+        np.add.at(self.light, (row, column), self.stars["electrons"][faint] / (self.rate * self.solid_angle)[row, column])
 
     def inside(self, cell):
         """The rows and columns of the pixels of a cell."""
@@ -161,6 +177,7 @@ def compared(found, truth, maps):
     sky = found["sky"]
     true = TrueSky(truth, maps)
     true.add_limits(found)
+    true.add_faint_stars(found)
     rows, behind_sr, known_sr = [], 0.0, 0.0
     for cell in sky["cells"]:
         pixels = true.inside(cell)

@@ -216,6 +216,7 @@ impl CurvedFrame<'_, '_> {
         chosen.sort_by(|a, b| a.v_mag().total_cmp(&b.v_mag()));
         chosen.truncate(MOST);
         Spot::deviate(&mut chosen);
+        Spot::add_light_beyond(&mut chosen);
         chosen
     }
 

@@ -100,6 +100,29 @@ impl Spot {
         }
     }
 
+    /// Gives spots the light that is beyond their reach: what all lack of the fluxes that were fitted to them, in
+    /// the median.
+    pub fn add_light_beyond(spots: &mut [Self]) {
+        let mut caught: Vec<f64> = spots.iter().filter_map(Self::caught).collect();
+        if caught.is_empty() {
+            return;
+        }
+        let caught = median(&mut caught);
+        for spot in spots {
+            spot.flux_per_light /= caught;
+        }
+    }
+
+    /// The sum of its levels over the sky, over the flux that was fitted to it.
+    fn caught(&self) -> Option<f64> {
+        let fitted_adu =
+            libm::pow(10.0, -0.4 * self.star.measured?.instrumental_mag) / self.flux_per_light;
+        let (sky_adu, _) = mean_and_variance(&self.around_adu);
+        let sum_adu: f64 = self.levels_adu.iter().map(|level| level - sky_adu).sum();
+        let caught = sum_adu / fitted_adu;
+        (caught > 0.0 && caught.is_finite()).then_some(caught)
+    }
+
     /// The error of its magnitude that is expected, by the noise of the sky around it.
     pub fn sigma_mag(&self) -> f64 {
         MAG_PER_RELATIVE * self.noise_adu() / self.expected_adu
