@@ -1,8 +1,7 @@
 """The sky that `starpipe sky` states for a frame of all_sky.py, and the truth, cell by cell.
 
 `compared` gives a row for each cell above 10° of altitude and one for the frame, `summary` their errors over the
-stated ones. The true limit of a cell is where half of the drawn stars are detected: a smooth function of the place, fitted to
-all single stars of the frame, plus what the detection's threshold differs from it in the cell.
+stated ones. Limits are compared with which of the drawn stars that are alone are detected.
 """
 
 import math
@@ -19,8 +18,9 @@ CLEAR_MAG = 0.2
 # Stars with less light, in the noise of a pixel, and farther from detections than this are part of the sky.
 FAINTEST_SEEN, ALONE_PX = 20, 2.5
 METER_DEG, METER_REACH_DEG, MOON_REACH_DEG = 20, 30, 10
-# Width of the fall of completeness at one limit, in magnitudes.
-WIDTH_MAG = 0.3
+# Least width of the fall of completeness, in magnitudes: noise at a threshold of 8 standard deviations.
+LEAST_WIDTH_MAG = 0.13
+BANDS_DEG, LEAST_STARS = [(10, 90), (10, 20), (20, 40), (40, 90)], 300
 
 
 def normal(z):
@@ -54,7 +54,6 @@ class TrueSky:
         self.rate = rate * passed
         # V of a star of one standard deviation of a pixel's noise.
         self.noise_vmag = 2.5 * np.log10(rate * passed / self.noise_e) - truth["extinction_mag"] * self.airmass - self.cloud_mag
-        self.smooth = [np.ones_like(off_axis), self.airmass, off_axis**2]
         ring = np.where(self.shown, np.clip(self.altitude_deg // RING_DEG, 0, 17), -1)
         self.rings = [np.nonzero(ring == number) for number in range(18)]
         self.azimuths_deg = [self.azimuth_deg[pixels] for pixels in self.rings]
@@ -86,7 +85,7 @@ class TrueSky:
         return tuple(along[chosen] for along in self.rings[ring])
 
     def single_stars(self, found):
-        """Rows, columns, magnitudes over the noise, and whether a detection has the name, of stars that are alone."""
+        """Rows, columns, V magnitudes by their light, and whether a detection has the name, of stars that are alone."""
         bright = self.stars["electrons"] > 0.02 * np.nanmedian(self.noise_e)
         places = np.c_[self.stars["x"], self.stars["y"]][bright]
         tree, light, size = cKDTree(places), self.stars["electrons"][bright], len(self.shown)
@@ -103,36 +102,21 @@ class TrueSky:
         near = tree.query_ball_point(places[chosen], 6.5)
         single = [all(other == star or light[other] < 0.4 * light[star] for other in around) for star, around in zip(chosen, near)]
         chosen = chosen[np.array(single)]
-        return row[chosen], column[chosen], over_noise[chosen], named[chosen]
+        row, column = row[chosen], column[chosen]
+        return row, column, self.noise_vmag[row, column] + over_noise[chosen], named[chosen]
 
-    def add_limits(self, found):
-        """Finds where half of the stars are detected."""
-        cells = [cell for cell in found["sky"]["cells"] if cell["expected_limit_vmag"] is not None]
-        excess = np.zeros(self.shown.shape)
-        rows = []
-        for cell in cells:
+    def limits(self, found):
+        """Altitude, by how much a star is brighter than the limit of its cell, the error of that, and whether it is detected."""
+        limit, sigma, inside = (np.full(self.shown.shape, np.nan) for _ in range(3))
+        for cell in found["sky"]["cells"]:
             pixels = self.inside(cell)
-            if len(pixels[0]) > 3:
-                clear_vmag = np.mean(self.noise_vmag[pixels] + self.cloud_mag[pixels])
-                rows.append((pixels, cell["expected_limit_vmag"] - clear_vmag, [np.mean(term[pixels]) for term in self.smooth]))
-        terms = np.array([row[2] for row in rows])
-        values = np.array([row[1] for row in rows])
-        smooth = terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
-        for (pixels, value, _), expected in zip(rows, smooth):
-            excess[pixels] = value - expected
-        row, column, over_noise, named = self.single_stars(found)
-        fixed = excess[row, column]
-        design = np.array([term[row, column] for term in self.smooth]).T
-
-        def cost(unknowns):
-            *places, log_width, lost = unknowns
-            z = (design @ places + fixed - over_noise) / math.exp(log_width)
-            chance = np.clip((1 - special.expit(lost)) * normal(z), 1e-6, 1 - 1e-6)
-            return -np.log(np.where(named, chance, 1 - chance)).sum() + 0.5 * (log_width + 1.2) ** 2
-
-        start = [np.quantile(over_noise[named], 0.85), 0.0, 0.0, -1.2, -3.0]
-        best = optimize.minimize(cost, start, method="Nelder-Mead", options={"maxiter": 4000, "maxfev": 4000})
-        self.limit_vmag = self.noise_vmag + excess + sum(a * term for a, term in zip(best.x, self.smooth))
+            if cell["limit_vmag"] is not None and cell["altitude_deg"][0] >= LOWEST_DEG and len(pixels[0]) >= MIN_PIXELS:
+                limit[pixels], sigma[pixels] = cell["limit_vmag"], cell["limit_sigma_mag"]
+                # A cell's limit is that of its middle.
+                inside[pixels] = self.noise_vmag[pixels] - self.noise_vmag[pixels].mean()
+        row, column, vmag, is_detected = self.single_stars(found)
+        rows = np.c_[self.altitude_deg[row, column], (limit + inside)[row, column] - vmag, sigma[row, column], is_detected]
+        return rows[np.isfinite(rows[:, 1])]
 
     def zenith_mag_arcsec2(self):
         """What a meter sees, without what is by the Moon."""
@@ -143,15 +127,6 @@ class TrueSky:
             weight = np.where(toward > math.cos(math.radians(MOON_REACH_DEG)), 0, weight)
         weight = weight * self.solid_angle
         return -2.5 * math.log10(np.nansum(weight * self.light) / weight.sum())
-
-
-def half_detected(limits):
-    """The magnitude at which half of the stars are detected where they have these limits."""
-    bright, faint = limits.min() - 0.01, limits.max() + 0.01
-    for _ in range(30):
-        middle = 0.5 * (bright + faint)
-        bright, faint = (middle, faint) if normal((limits - middle) / WIDTH_MAG).mean() > 0.5 else (bright, middle)
-    return 0.5 * (bright + faint)
 
 
 def pair(value, sigma, right):
@@ -176,7 +151,6 @@ def compared(found, truth, maps):
     """Rows of the cells, and the row of the frame, with errors and stated errors."""
     sky = found["sky"]
     true = TrueSky(truth, maps)
-    true.add_limits(found)
     true.add_faint_stars(found)
     rows, behind_sr, known_sr = [], 0.0, 0.0
     for cell in sky["cells"]:
@@ -195,12 +169,12 @@ def compared(found, truth, maps):
             "clouds": truth["cloud_cover"] > 0, "altitude_deg": np.mean(cell["altitude_deg"]),
             "brightness": pair(cell["mag_arcsec2"], cell["sigma_mag"], true.brightness(cell)),
             "extinction": pair(cell["extinction_mag"], cell["extinction_sigma_mag"], cloud_mag),
-            "limit": pair(cell["limit_vmag"], cell["limit_sigma_mag"], half_detected(true.limit_vmag[pixels])),
             "clear": (cell["clear"], cell.get("clear_low"), cell.get("clear_high")), "is_clear": cloud_mag < CLEAR_MAG,
         })
     is_known = known_sr > 0
     return rows, {
         "clouds": truth["cloud_cover"] > 0,
+        "limits": true.limits(found),
         "zenith": zenith(sky, true),
         "share": pair(sky["cloud_share"], sky["cloud_share_sigma"], behind_sr / known_sr) if is_known else None,
         "air": pair(sky["extinction_mag_per_airmass"], sky["extinction_sigma_mag"], truth["extinction_mag"]) if sky["extinction_measured"] else None,
@@ -216,6 +190,24 @@ def told(name, pairs):
     return f"{name:<28} {len(errors):>6} {np.mean(errors[:, 0]):+.3f} {np.sqrt(np.mean(errors[:, 0]**2)):.3f} {np.sqrt(np.mean(pulls**2)):.2f}"
 
 
+def told_limits(name, stars):
+    """One line: number of stars, and what makes their detections likeliest: by how much stated limits are too faint, and their
+    errors in units of the stated ones. Completeness falls over a width that is fitted, too."""
+    _, brighter, sigma, is_detected = stars.T
+
+    def cost(unknowns):
+        offset, ln_width, ln_pull, lost = unknowns
+        width = np.maximum(np.exp(ln_width), LEAST_WIDTH_MAG)
+        z = (brighter - offset) / np.hypot(width, np.exp(ln_pull) * sigma)
+        chance = np.clip((1 - special.expit(lost)) * normal(z), 1e-9, 1 - 1e-9)
+        return -np.log(np.where(is_detected > 0, chance, 1 - chance)).sum()
+
+    if len(stars) < LEAST_STARS:
+        return f"{name:<28} –"
+    best = optimize.minimize(cost, [0, math.log(0.2), 0, -3], method="Nelder-Mead", options={"maxiter": 4000, "maxfev": 4000})
+    return f"{name:<28} {len(stars):>6} {best.x[0]:+.3f} {'':>5} {math.exp(best.x[2]):.2f}"
+
+
 def summary(cells, frames):
     """Lines for people."""
     lines = ["", f"{'sky':<28} {'number':>6} {'mean':>6} {'RMS':>5} RMS over stated error"]
@@ -223,8 +215,12 @@ def summary(cells, frames):
         "": lambda row: True, " without clouds": lambda row: not row["clouds"], " with clouds": lambda row: row["clouds"],
         " 10 to 20°": lambda row: row["altitude_deg"] < 20, " without clouds, to 20°": lambda row: row["altitude_deg"] < 20 and not row["clouds"],
     }
-    for quantity in ("brightness", "extinction", "limit"):
+    for quantity in ("brightness", "extinction"):
         lines += [told(quantity + name, [row[quantity] for row in cells if belongs(row)]) for name, belongs in groups.items()]
+    for name, belongs in list(groups.items())[:3]:
+        stars = np.concatenate([row["limits"] for row in frames if belongs(row)] or [np.empty((0, 4))])
+        for start, end in BANDS_DEG:
+            lines.append(told_limits(f"limit{name}, {start} to {end}°", stars[(stars[:, 0] >= start) & (stars[:, 0] < end)]))
     for quantity in ("zenith", "share", "air"):
         lines += [told(quantity + name, [row[quantity] for row in frames if belongs(row)]) for name, belongs in list(groups.items())[:3]]
     lines += ["", "clear          cells   mean   band           share that is"]

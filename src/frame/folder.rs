@@ -180,6 +180,14 @@ impl Picture {
         }
     }
 
+    /// Whether its header can be read, as far as it is looked at here.
+    fn is_whole(&self) -> bool {
+        let is_fits = || {
+            head_of(&self.path).is_ok_and(|head| FrameFormat::of(&head) == Some(FrameFormat::Fits))
+        };
+        self.size.is_some() || is_fits()
+    }
+
     /// What pictures of the same moment share: the time in the name, else the name.
     fn moment(&self) -> String {
         let date = ObservationDate::in_file_name(&self.path).filter(ObservationDate::has_time);
@@ -314,10 +322,10 @@ fn aspect([width, height]: [u32; 2]) -> f64 {
 }
 
 /// The pictures with the same bytes as another one. Of these, the one with a date in its name is the frame, or
-/// else the first by name.
+/// else the first by name. Damaged files that are alike are not: reading each tells why.
 fn copies(pictures: &[Picture]) -> HashSet<PathBuf> {
     let mut by_length: HashMap<u64, Vec<&Path>> = HashMap::new();
-    for picture in pictures {
+    for picture in pictures.iter().filter(|picture| picture.is_whole()) {
         let length = fs::metadata(&picture.path).map_or(0, |found| found.len());
         by_length.entry(length).or_default().push(&picture.path);
     }
@@ -502,6 +510,18 @@ mod tests {
             ("thumb_7.png", "thumbnail"),
         ];
         assert_eq!(others, expected);
+    }
+
+    #[test]
+    fn damaged_files_with_the_same_bytes_are_no_copies() {
+        let folder = Drawn::new();
+        folder.frames(4);
+        for name in ["a.jpg", "b.jpg"] {
+            folder.file(name, b"\xff\xd8\xff\xe0 no more");
+        }
+        let (frames, others) = folder.sorted(Cameras::OneNight);
+        assert_eq!(frames.len(), 6);
+        assert_eq!(others, []);
     }
 
     #[test]

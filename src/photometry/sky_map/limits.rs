@@ -87,6 +87,9 @@ fn measured_over_depth(
     /// Stars above the expected limit. A choice by those that are found would prefer cells in which chance
     /// shows more.
     const LEAST_BRIGHT: usize = 12;
+    /// Error for each doubling of the reach and each airmass, in magnitudes: what thresholds do not tell of stars
+    /// elsewhere. By frames of scripts/all_sky.py, whose stars are as often detected as stated with it.
+    const ELSEWHERE_MAG: f64 = 0.06;
     /// Largest standard error.
     const MOST_SIGMA_MAG: f64 = 0.5;
     // Elsewhere stars tell nothing of the clouds here.
@@ -103,13 +106,18 @@ fn measured_over_depth(
         };
         near.map(moved).collect()
     };
-    let is_enough = |stars: &Vec<CountedStar>| {
+    let is_enough = |stars: &[CountedStar]| {
         let bright = stars.iter().filter(|star| star.v_mag < expected);
         bright.count() >= LEAST_BRIGHT
     };
-    let stars = REACHES.into_iter().map(near).find(is_enough)?;
+    let mut reaches = REACHES
+        .into_iter()
+        .map(|reach| (libm::log2(reach), near(reach)));
+    let (doublings, stars) = reaches.find(|(_, stars)| is_enough(stars))?;
     let limit = completeness::measure(&stars, sky.chance).limit.ok()?;
-    let sigma = libm::hypot(limit.sigma_mag, here.sigma);
+    let airmass = sky.levels.cells[cell].airmass.unwrap_or(1.0);
+    let elsewhere_mag = ELSEWHERE_MAG * airmass * doublings;
+    let sigma = libm::hypot(libm::hypot(limit.sigma_mag, here.sigma), elsewhere_mag);
     (sigma < MOST_SIGMA_MAG).then_some(Estimate {
         value: limit.v_mag,
         sigma,

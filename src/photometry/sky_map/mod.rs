@@ -168,7 +168,7 @@ pub fn measure(
         depths: &depths,
         frame,
         moon: picture.moon,
-        exposure_s: levels.exposure_s,
+        levels: &levels,
         chance: association.chance,
         is_usual: usual.is_some(),
     };

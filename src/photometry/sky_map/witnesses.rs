@@ -1,5 +1,6 @@
 //! The stars as witnesses of the sky in which they are.
 
+use super::brightness::Levels;
 use super::clear_sky::ClearSky;
 use super::grid::Grid;
 use super::stars::SkyStar;
@@ -21,8 +22,8 @@ pub(super) struct Sky<'a> {
     pub frame: &'a IdentifiedFrame<'a>,
     /// Where the Moon is, where the date is known.
     pub moon: Option<UnitVector<Icrs>>,
-    /// Fluxes are over this time.
-    pub exposure_s: f64,
+    /// Light and threshold of the cells.
+    pub levels: &'a Levels,
     /// Probability that a star has a detection by chance.
     pub chance: f64,
     /// Whether the clear sky is that of another frame.
@@ -54,7 +55,7 @@ impl Sky<'_> {
     /// limit is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
         let limit_adu = self.frame.detections.flux_limits.typical()?;
-        let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
+        let limit_mag = instrumental_mag(limit_adu / self.levels.exposure_s);
         Some(self.clear_sky.v_mag(self.center_airmass(), 0.0, limit_mag))
     }
 
@@ -73,7 +74,7 @@ impl Sky<'_> {
     fn witness<'s>(&self, star: &'s SkyStar) -> Option<Witness<'s>> {
         let cell = self.grid.cell_of(&star.pixel, &star.direction)?;
         let limit_adu = self.frame.flux_limit_adu(&star.pixel)?;
-        let limit_mag = instrumental_mag(limit_adu / self.exposure_s);
+        let limit_mag = instrumental_mag(limit_adu / self.levels.exposure_s);
         Some(Witness {
             star,
             cell,
