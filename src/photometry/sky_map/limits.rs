@@ -88,8 +88,8 @@ fn measured_over_depth(
     /// shows more.
     const LEAST_BRIGHT: usize = 12;
     /// Error for each doubling of the reach and each airmass, in magnitudes: what thresholds do not tell of stars
-    /// elsewhere. By frames of scripts/all_sky.py, whose stars are as often detected as stated with it.
-    const ELSEWHERE_MAG: f64 = 0.06;
+    /// elsewhere. By clear frames of scripts/all_sky.py.
+    const ELSEWHERE_MAG: f64 = 0.05;
     /// Largest standard error.
     const MOST_SIGMA_MAG: f64 = 0.5;
     // Elsewhere stars tell nothing of the clouds here.
