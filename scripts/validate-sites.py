@@ -19,8 +19,7 @@ import tempfile
 
 import all_sky
 import numpy as np
-from astropy import units as u
-from astropy.coordinates import AltAz, EarthLocation, SkyCoord, get_sun
+from astropy.coordinates import get_sun
 from astropy.time import Time
 from astropy.utils import iers
 
@@ -37,20 +36,15 @@ class Sky:
         self.lat = math.degrees(math.asin(random.uniform(-0.9, 0.9)))
         self.lon = random.uniform(-180, 180)
         self.height = random.uniform(0, 2500)
-        place = EarthLocation(lon=self.lon * u.deg, lat=self.lat * u.deg, height=self.height * u.m)
         while True:
             self.date = datetime.datetime(2010, 1, 1) + datetime.timedelta(days=int(random.integers(5800)), seconds=int(random.integers(86400)))
-            time = Time(self.date)
-            frame = AltAz(obstime=time, location=place)
-            if get_sun(time).transform_to(frame).alt.deg < -10:
+            place = all_sky.Place(self.lat, self.lon, self.height, Time(self.date))
+            if get_sun(place.time).transform_to(place.airless).alt.deg < -10:
                 break
-        refracting = AltAz(obstime=time, location=place, pressure=1013.25 * (1 - 2.25577e-5 * self.height) ** 5.25588 * u.hPa,
-                           temperature=(15 - 6.5e-3 * self.height) * u.deg_C, obswl=0.574 * u.um)
-        ra, dec, pm_ra, pm_dec, vmag, _ = catalog[:, catalog[4] < (8 if narrow else 6.3)]
-        years = time.jyear - 2000
-        moved = SkyCoord((ra + pm_ra * years / 3600 / np.cos(np.radians(dec))) * u.deg, (dec + pm_dec * years / 3600) * u.deg)
-        seen = moved.transform_to(refracting)
-        self.rows = self.seen_by_camera(seen.alt.rad, seen.az.rad, vmag, random)
+        seen = catalog[:, catalog[4] < (8 if narrow else 6.3)]
+        north, east, up = all_sky.observed_stars(seen, place).T
+        vmag = seen[4]
+        self.rows = self.seen_by_camera(np.arcsin(up), np.arctan2(east, north), vmag, random)
 
     def seen_by_camera(self, alt, az, vmag, random):
         tilt = random.uniform(5, 20) if random.random() < 0.15 else abs(random.normal(0, 1.5))

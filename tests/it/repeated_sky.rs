@@ -38,6 +38,10 @@ fn collages_and_mirrored_pictures_are_told() {
         [if x < width { x } else { 2 * width - 1 - x }, y]
     });
     assert!(codes(&mirrored).contains(&"repeated_sky"));
+    let turned = picture(&frame, [width, 2 * height], |x, y| {
+        [x, if y < height { y } else { 2 * height - 1 - y }]
+    });
+    assert!(codes(&turned).contains(&"repeated_sky"));
 }
 
 #[test]

@@ -16,6 +16,9 @@ pub(super) struct Spot {
     /// Levels of its pixels, and of those of the sky, in ADU.
     levels_adu: Vec<f64>,
     around_adu: Vec<f64>,
+    /// The sky's mean level, in ADU, and the variance of a pixel.
+    sky_adu: f64,
+    variance_adu2: f64,
     /// Fluxes over light: what neighbors add, what the lens takes, and the exposure.
     flux_per_light: f64,
     /// Sum of its levels over the sky that is expected, in ADU.
@@ -83,10 +86,13 @@ impl Spot {
             .iter()
             .all(|level| *level < BRIGHTEST * white_adu);
         clip(&mut around_adu);
+        let (sky_adu, variance_adu2) = mean_and_variance(&around_adu);
         (is_whole && !around_adu.is_empty()).then_some(Self {
             star: *star,
             levels_adu,
             around_adu,
+            sky_adu,
+            variance_adu2,
             flux_per_light,
             expected_adu: flux / flux_per_light,
             deviate: 0.0,
@@ -117,9 +123,8 @@ impl Spot {
     fn caught(&self) -> Option<f64> {
         let fitted_adu =
             libm::pow(10.0, -0.4 * self.star.measured?.instrumental_mag) / self.flux_per_light;
-        let (sky_adu, _) = mean_and_variance(&self.around_adu);
-        let sum_adu: f64 = self.levels_adu.iter().map(|level| level - sky_adu).sum();
-        let caught = sum_adu / fitted_adu;
+        let over_adu = self.levels_adu.iter().map(|level| level - self.sky_adu);
+        let caught = over_adu.sum::<f64>() / fitted_adu;
         (caught > 0.0 && caught.is_finite()).then_some(caught)
     }
 
@@ -131,8 +136,8 @@ impl Spot {
     /// The noise of the sum of its levels.
     fn noise_adu(&self) -> f64 {
         let count = self.levels_adu.len() as f64;
-        let (_, variance) = mean_and_variance(&self.around_adu);
-        (variance * count * (1.0 + count / self.around_adu.len() as f64)).sqrt()
+        let of_sum = count * (1.0 + count / self.around_adu.len() as f64);
+        (self.variance_adu2 * of_sum).sqrt()
     }
 
     /// The level that is expected of its brightest pixel.
@@ -143,8 +148,7 @@ impl Spot {
             0.5 * (part(0.5) - part(-0.5))
         };
         let [x, y] = self.star.seen_at.map_or([0.0; 2], |at| [at.x, at.y]);
-        let (sky_adu, _) = mean_and_variance(&self.around_adu);
-        sky_adu + self.expected_adu * share(x) * share(y)
+        self.sky_adu + self.expected_adu * share(x) * share(y)
     }
 
     /// V magnitude of the star.
@@ -157,17 +161,16 @@ impl Spot {
         let count = self.levels_adu.len() as f64;
         let around: Vec<f64> = self.around_adu.iter().map(|at| curve.light(*at)).collect();
         let (sky, variance) = mean_and_variance(&around);
-        let (sky_adu, variance_adu) = mean_and_variance(&self.around_adu);
         let (mut light, mut flux_adu, mut response_adu) = (0.0, 0.0, 0.0);
         let mut noise2 = variance * count.powi(2) / around.len() as f64;
         for level_adu in &self.levels_adu {
             let over = curve.light(*level_adu) - sky;
             // Noise makes pixels darker than the sky.
-            let light_per_adu = curve.light_per_adu(level_adu.max(sky_adu));
+            let light_per_adu = curve.light_per_adu(level_adu.max(self.sky_adu));
             light += over;
-            flux_adu += level_adu - sky_adu;
+            flux_adu += level_adu - self.sky_adu;
             response_adu += over / light_per_adu;
-            noise2 += variance_adu * light_per_adu.powi(2);
+            noise2 += self.variance_adu2 * light_per_adu.powi(2);
         }
         let response = response_adu / flux_adu;
         let is_seen = light > 0.0 && flux_adu > 0.0 && response > 0.0 && response.is_finite();
