@@ -5,13 +5,13 @@
 
 use criterion::measurement::WallTime;
 use criterion::{BatchSize, BenchmarkGroup, Criterion, criterion_group, criterion_main};
+use starpipe::catalog::Catalog;
+use starpipe::catalog::sky_grid::SkyGrid;
 use starpipe::detect::{self, DetectConfig, detect};
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, IndexedCatalog, Priors, ScalePrior, StarField, identify};
 use starpipe::pipeline::{Context, Workspace, solve_frame, star_field};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::catalog::sky_grid::SkyGrid;
-use starpipe::sky::places::StarPlaces;
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;

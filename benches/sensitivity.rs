@@ -9,10 +9,10 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::camera::data_sheet::Preset;
+use starpipe::catalog::Catalog;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::model::sensitivity::{Budget, Detector, Rule, Scenario};
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 use std::hint::black_box;
 
 fn prediction(criterion: &mut Criterion) {

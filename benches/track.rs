@@ -6,12 +6,12 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::camera::data_sheet::{DataSheet, Preset};
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::Frame;
 use starpipe::identify::IndexedCatalog;
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
 use starpipe::pipeline::Context;
-use starpipe::sky::places::StarPlaces;
 use starpipe::track::{Mode, Tracker};
 use std::hint::black_box;
 

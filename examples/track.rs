@@ -6,11 +6,11 @@
 //! `cargo run --release --no-default-features --features built-in-catalog --example track -- FRAME FRAME ...`
 
 use starpipe::camera::data_sheet::Preset;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, FrameError};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Setup, Simulator};
 use starpipe::nalgebra::Vector3;
-use starpipe::sky::places::StarPlaces;
 use starpipe::{Catalog, Context, Frame, IndexedCatalog, Rotation, Track, Tracker, UnitVector};
 use std::error::Error;
 

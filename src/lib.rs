@@ -11,9 +11,9 @@
 //! ```text
 //! file ─ frame ─ calibration ─ detect ─ identify ─ photometry ─ report
 //!                                │         │           │
-//!                             sources    sky:       model:
-//!                                      catalogue   what should
-//!                                      of stars    be seen
+//!                             sources   catalog    model:
+//!                                      of stars   what should
+//!                                                  be seen
 //! ```
 //!
 //! [`pipeline`] runs the stages in this order, [`report`] presents the [`Solution`].
@@ -42,7 +42,8 @@
 //! | module | answers |
 //! |---|---|
 //! | `base` | what numbers mean: units, directions, dates, statistics |
-//! | [`sky`] | what is up there, and from where it is seen: catalogue, Moon and planets, observer |
+//! | [`catalog`] | which stars there are |
+//! | [`ephemeris`] | from where and when one looks: observer, places of stars, Moon and planets |
 //! | [`frame`] | what a file holds: readers, writers, metadata |
 //! | [`camera`] | what instrument: geometry, data sheet |
 //! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |
@@ -50,6 +51,7 @@
 //! | [`identify`](mod@identify) | which stars, which attitude, or why not |
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
+//! | [`sky`] | how bright is the sky, how clear, and how faint do stars go at each place |
 //! | [`pipeline`] | what does a frame show: the stages in order |
 //! | [`lens`] | which lens, from several frames of a camera at once |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
@@ -76,7 +78,9 @@ pub mod archive;
 pub mod base;
 pub mod calibration;
 pub mod camera;
+pub mod catalog;
 pub mod detect;
+pub mod ephemeris;
 pub mod frame;
 pub mod identify;
 pub mod lens;
@@ -99,7 +103,9 @@ pub use base::remedy::{OptionNames, Remedy};
 pub use base::size::Size;
 pub use calibration::Calibration;
 pub use camera::CameraModel;
+pub use catalog::{Catalog, Star};
 pub use detect::{DetectConfig, Detection, Detections, detect};
+pub use ephemeris::observer::Site;
 pub use frame::Frame;
 pub use identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, SkyRegion, StarMatch, identify,
@@ -110,8 +116,6 @@ pub use pipeline::{
     solve_centroids, solve_file, solve_frame,
 };
 pub use report::{FrameReport, TextOptions};
-pub use sky::catalog::{Catalog, Star};
-pub use sky::observer::Site;
 pub use track::{Track, Tracker};
 
 #[doc = include_str!("../docs/conventions.md")]

@@ -4,12 +4,12 @@
 //! usage: `bench_worker FROM:TO`, the range of horizontal fields in degrees.
 
 use serde_json::{Value, json};
+use starpipe::catalog::Catalog;
 use starpipe::detect::{self, DetectConfig, Detections, detect_into};
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Identification, IndexedCatalog, Priors, ScalePrior};
 use starpipe::pipeline::star_field;
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;

@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Normal, Poisson};
 use starpipe::base::coords::{PixelPoint, Rotation, UnitVector};
 use starpipe::base::units::RAD_PER_DEG;
 use starpipe::camera::{CameraModel, focal_length_px};
-use starpipe::sky::catalog::Catalog;
+use starpipe::catalog::Catalog;
 use std::error::Error;
 use std::fs::File;
 use std::path::Path;

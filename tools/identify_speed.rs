@@ -8,13 +8,13 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::camera::CameraModel;
+use starpipe::catalog::Catalog;
 use starpipe::detect::{self, DetectConfig, detect};
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, StarField, Workspace,
 };
 use starpipe::pipeline::star_field;
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Answer, Protocol, SimulatedCentroids};
 use std::error::Error;
 use std::f64::consts::SQRT_2;

@@ -4,7 +4,7 @@ use super::scratch::{directory, with_file};
 use starpipe::archive::names_in;
 use starpipe::calibration::read_hot_pixels;
 use starpipe::camera::data_sheet::{DataSheet, Response, SpotImage};
-use starpipe::sky::catalog::Catalog;
+use starpipe::catalog::Catalog;
 use starpipe::study::validation::store::RunTables;
 use starpipe::{IndexedCatalog, Interrupt};
 use std::fs;

@@ -3,8 +3,8 @@
 use crate::errors::{exception, message, warn};
 use pyo3::prelude::*;
 use starpipe::Interrupt;
+use starpipe::catalog::{self, Catalog};
 use starpipe::identify::{IndexedCatalog, cache_directory};
-use starpipe::sky::catalog::{self, Catalog};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};

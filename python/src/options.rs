@@ -4,10 +4,10 @@ use crate::errors::exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use starpipe::detect::CentroidMethod;
+use starpipe::ephemeris::observer::Air;
+use starpipe::ephemeris::places::AttitudeFrame;
 use starpipe::identify::Effort;
 use starpipe::pipeline::SolveOptions;
-use starpipe::sky::observer::Air;
-use starpipe::sky::places::AttitudeFrame;
 use starpipe::{ObservationDate, Site, UtcOffset};
 
 /// The options as Python has checked them; `None` stands for the default.

@@ -6,7 +6,7 @@ use super::output::overwrite::is_same_file;
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use starpipe::base::format::counted;
-use starpipe::sky::catalog::{self, SourceFile};
+use starpipe::catalog::{self, SourceFile};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

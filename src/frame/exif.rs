@@ -9,7 +9,7 @@
 use super::metadata::{EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE};
 use super::orientation::Orientation;
 use crate::base::epoch::ObservationDate;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use exif::{Field, In, Reader, Tag, Value};
 
 /// Metadata from the Exif attributes in `bytes`, which have the layout of a TIFF file, for a frame

@@ -5,7 +5,7 @@ use super::orientation::Orientation;
 use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::excerpt;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use std::fmt;
 use std::ops::RangeInclusive;
 

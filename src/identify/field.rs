@@ -2,7 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::detect::SkyArea;
-use crate::sky::places::StarPlaces;
+use crate::ephemeris::places::StarPlaces;
 
 /// Position of a source in the frame's list of sources: its detections, or the lines of a centroid
 /// list.

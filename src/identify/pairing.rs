@@ -2,9 +2,9 @@
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::neighbors::PointGrid;
+use crate::catalog::StarIndex;
 use crate::identify::field::ObservedStar;
 use crate::identify::predict::PredictedStar;
-use crate::sky::catalog::StarIndex;
 use std::cmp::Reverse;
 
 /// The candidates of a star are in the order of strips along x: one for each predicted star, but at

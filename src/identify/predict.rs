@@ -2,10 +2,10 @@
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::CameraModel;
+use crate::catalog::StarIndex;
+use crate::catalog::sky_grid::{GridStar, chord_of};
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::index::IndexedCatalog;
-use crate::sky::catalog::StarIndex;
-use crate::sky::catalog::sky_grid::{GridStar, chord_of};
-use crate::sky::places::StarPlaces;
 
 /// Margin outside the frame, in units of its diagonal, within which a predicted star may still be
 /// observed.

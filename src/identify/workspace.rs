@@ -6,6 +6,7 @@ use crate::base::interrupt::Interrupt;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::KnownLens;
 use crate::camera::{CameraModel, DistortionModel};
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::effort::Effort;
 use crate::identify::field::{CoarserFields, StarField};
 use crate::identify::fit::{NamingStart, Refined, Start};
@@ -18,7 +19,6 @@ use crate::identify::search::{
     Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers, Window,
     Windows,
 };
-use crate::sky::places::StarPlaces;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ pub const NAME_ODDS: f64 = 100.0;
 ///
 /// # Example
 /// ```
-/// use starpipe::sky::places::StarPlaces;
+/// use starpipe::ephemeris::places::StarPlaces;
 /// use starpipe::detect::{self, Detection, DetectConfig, detect};
 /// use starpipe::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 /// use starpipe::{Catalog, IndexedCatalog, Priors, frame, identify};

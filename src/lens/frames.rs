@@ -4,11 +4,11 @@ use super::formats::Pointing;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::camera::CameraModel;
+use crate::catalog::StarIndex;
+use crate::ephemeris::observer::Observation;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::fit::JointFrame;
 use crate::pipeline::{Outcome, Reason, Solution};
-use crate::sky::catalog::StarIndex;
-use crate::sky::observer::Observation;
-use crate::sky::places::StarPlaces;
 use std::cmp::Ordering;
 
 /// A frame with its stars.

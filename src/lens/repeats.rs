@@ -8,8 +8,8 @@
 
 use super::frames::LensFrame;
 use crate::base::statistics::median;
+use crate::catalog::StarIndex;
 use crate::identify::fit::{JointFit, JointFrame};
-use crate::sky::catalog::StarIndex;
 use std::collections::HashMap;
 
 /// Where the stars of frames repeat: a place is a star in the frames of one direction.

@@ -3,9 +3,9 @@
 use crate::base::coords::{Horizon, Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::DEG_PER_RAD;
-use crate::sky::observer::Site;
-use crate::sky::places::StarPlaces;
-use crate::sky::solar_system::moon_and_sun;
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::places::StarPlaces;
+use crate::ephemeris::solar_system::moon_and_sun;
 use std::f64::consts::TAU;
 
 /// Altitudes of the Sun's center at which twilights end, in degrees, and what it is above them.

@@ -1,6 +1,6 @@
 //! The sky at each place of a frame, on the grid that all frames of a night share.
 
-use crate::photometry::sky_map::{Place, SkyCell, SkyMap, horizon_places};
+use crate::sky::{Place, SkyCell, SkyMap, horizon_places};
 use serde::{Deserialize, Serialize};
 
 /// The sky in the cells of [`horizon_places`], in their order; `null` where nothing is known.

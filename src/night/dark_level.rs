@@ -2,7 +2,7 @@
 
 use crate::base::statistics::{Estimate, median, median_and_sigma};
 use crate::frame::Frame;
-use crate::photometry::sky_map::{DarkLevel, DarkSource};
+use crate::sky::{DarkLevel, DarkSource};
 
 /// The level of a frame's background, and how long it was exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]

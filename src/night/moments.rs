@@ -8,7 +8,7 @@ use super::row::NightRow;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::finite;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use serde::Serialize;
 use std::f64::consts::TAU;
 

@@ -11,8 +11,8 @@ use crate::base::statistics::{Estimate, median};
 use crate::base::table::{Column, columns};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::Identification;
-use crate::photometry::sky_map::{Place, SkyCell, SkyMap};
 use crate::pipeline::{Outcome, Solution};
+use crate::sky::{Place, SkyCell, SkyMap};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -6,7 +6,7 @@
 
 use super::row::NightRow;
 use crate::base::epoch::ObservationDate;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use std::fmt::Write as _;
 
 /// What the header says of the station.

@@ -3,11 +3,11 @@
 use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::statistics::median;
 use crate::camera::KnownLens;
+use crate::ephemeris::observer::Site;
 use crate::identify::{DateZone, Identification};
 use crate::lens::{LensFrame, calibrate};
-use crate::photometry::sky_map::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
-use crate::sky::observer::Site;
+use crate::sky::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use jiff::SignedDuration;
 use std::sync::Arc;
 

@@ -5,7 +5,7 @@ use super::pointing::Knock;
 use super::row::NightRow;
 use crate::base::format::finite;
 use crate::base::statistics::median;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use serde::Serialize;
 
 /// A night is clear where less of the sky is behind clouds,

@@ -2,16 +2,16 @@
 
 use super::IdentifiedFrame;
 use crate::base::neighbors::PointTree;
+use crate::catalog::StarIndex;
 use crate::detect::PIXEL_VARIANCE_PX2;
 use crate::identify::{PredictedStar, StarMatch};
-use crate::sky::catalog::StarIndex;
 
 /// A neighbor fainter by more than this does not crowd a star.
 const CROWDING_MAG: f32 = 1.0;
 
 /// A catalogue star in the frame, with its detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FrameStar {
+pub(crate) struct FrameStar {
     /// The star.
     pub star: StarIndex,
     /// V magnitude.
@@ -27,14 +27,14 @@ pub(super) struct FrameStar {
 
 impl FrameStar {
     /// By how much its undetected neighbors make it brighter, in magnitudes.
-    pub(super) fn brighter_mag(&self) -> f64 {
+    pub(crate) fn brighter_mag(&self) -> f64 {
         2.5 * libm::log10(1.0 + self.neighbors_light)
     }
 }
 
 /// Catalog stars and their detections.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Association {
+pub(crate) struct Association {
     /// The stars, brightest first.
     pub stars: Vec<FrameStar>,
     /// Probability that a star has a detection by chance: that of a name that is chance.
@@ -122,7 +122,7 @@ impl FaintLight {
 }
 
 /// Associates the stars `predicted`, brightest first, with the detections of `frame`.
-pub(super) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
+pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
     let detections = detections_of(predicted, matches);
     let places = PointTree::new(predicted.iter().map(|star| star.pixel));
@@ -198,8 +198,8 @@ mod tests {
     use crate::base::coords::{PixelPoint, Rotation, UnitVector};
     use crate::camera::CameraModel;
     use crate::detect::Detections;
+    use crate::ephemeris::places::StarPlaces;
     use crate::identify::{Identification, SourceIndex};
-    use crate::sky::places::StarPlaces;
     use nalgebra::Matrix3;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;

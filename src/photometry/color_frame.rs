@@ -17,7 +17,7 @@ pub enum PictureColors<'a> {
 
 impl PictureColors<'_> {
     /// The flux of a star behind two filters, in the order of [`Self::frames`]: as [`ColorFrame::fluxes_adu`].
-    pub(super) fn fluxes_adu(&self, star: &PixelPoint, grey_sigma_px: f64) -> Option<[f64; 2]> {
+    pub(crate) fn fluxes_adu(&self, star: &PixelPoint, grey_sigma_px: f64) -> Option<[f64; 2]> {
         match self {
             Self::Raw(color) => {
                 let [_, first, second] = color.fluxes_adu(star, grey_sigma_px)?;
@@ -35,7 +35,7 @@ impl PictureColors<'_> {
     }
 
     /// The pixels behind the two filters; `None` if one of them has none with a value.
-    pub(super) fn frames(&self) -> Option<[Cow<'_, Frame<'static>>; 2]> {
+    pub(crate) fn frames(&self) -> Option<[Cow<'_, Frame<'static>>; 2]> {
         match self {
             Self::Raw(ColorFrame { mosaic, raw }) => {
                 let under = |filter| mosaic.pixels_under(filter, raw).map(Cow::Owned);
@@ -46,7 +46,7 @@ impl PictureColors<'_> {
     }
 
     /// Pixels of the picture for one of these, on each axis.
-    pub(super) const fn pixels_of_one(&self) -> usize {
+    pub(crate) const fn pixels_of_one(&self) -> usize {
         match self {
             Self::Raw(_) => 2,
             Self::RedAndBlue(_) => 1,

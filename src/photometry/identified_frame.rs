@@ -3,9 +3,9 @@
 use crate::base::coords::PixelPoint;
 use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detections;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::Identification;
 use crate::photometry::comparison::FieldPlace;
-use crate::sky::places::StarPlaces;
 
 /// An identified frame.
 #[derive(Debug, Clone, Copy)]
@@ -24,14 +24,14 @@ pub struct IdentifiedFrame<'a> {
 
 impl IdentifiedFrame<'_> {
     /// Part of the centre's light that the lens lets through to a place, as far as it is known.
-    pub(super) fn lens_transmission(&self, pixel: &PixelPoint) -> f64 {
+    pub(crate) fn lens_transmission(&self, pixel: &PixelPoint) -> f64 {
         let off_centre_sq = self.identification.camera.off_centre_sq(pixel);
         lens_transmission(self.vignetting, off_centre_sq)
     }
 
     /// Flux at which half of the stars at a place are detected, in ADU in front of the lens; `None` where nothing
     /// was searched.
-    pub(super) fn flux_limit_adu(&self, pixel: &PixelPoint) -> Option<f64> {
+    pub(crate) fn flux_limit_adu(&self, pixel: &PixelPoint) -> Option<f64> {
         let camera = &self.identification.camera;
         let size_px = [camera.width_px, camera.height_px];
         let limit_adu = self.detections.flux_limits.at(pixel, size_px)?;

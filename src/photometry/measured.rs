@@ -5,11 +5,11 @@ use super::identified_frame::IdentifiedFrame;
 use crate::detect::Detection;
 
 /// Magnitudes per relative error: 2.5 / ln 10.
-pub(super) const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
+pub(crate) const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
 
 /// A star's brightness in a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Measured {
+pub(crate) struct Measured {
     /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without its neighbors' light and what the
     /// lens takes.
     pub instrumental_mag: f64,

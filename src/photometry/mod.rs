@@ -10,20 +10,18 @@
 //!    stars. The faintest detected star is a poor measure of the limit, because it owes its detection
 //!    to noise.
 //! 4. [`comparison`] compares the results with the stated camera.
-//! 5. [`sky_map`] measures, on demand, the sky at each place of the frame.
 //!
 //! Caveats: an incomplete catalogue biases the completeness only if it lacks red stars or close
 //! pairs more than others. The limit is that of the frame's mean transparency, noise and star
 //! color. The grey levels of a JPEG are not proportional to light, so its zero point holds only
 //! for stars of medium brightness.
 
-mod association;
+pub(crate) mod association;
 mod color_frame;
 pub mod comparison;
 pub mod completeness;
 mod identified_frame;
 mod measured;
-pub mod sky_map;
 mod standards;
 pub mod zero_point;
 
@@ -36,12 +34,12 @@ pub use identified_frame::IdentifiedFrame;
 pub use measured::instrumental_mag;
 
 use crate::base::statistics::median;
+use crate::catalog::StarIndex;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, SkyView};
-use crate::sky::catalog::StarIndex;
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
-use measured::{MAG_PER_RELATIVE, Measured};
+pub(crate) use measured::{MAG_PER_RELATIVE, Measured};
 use standards::Standards;
 use zero_point::{NoZeroPoint, ZeroPoint};
 
@@ -112,7 +110,7 @@ pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry
 }
 
 /// The V magnitude to which catalogue stars are predicted: clearly fainter ones cannot be detected.
-fn depth_v_mag(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> f64 {
+pub(crate) fn depth_v_mag(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> f64 {
     /// How far beyond the faintest detection.
     const MARGIN_MAG: f64 = 1.0;
     let sources = &frame.detections.sources;

@@ -4,10 +4,10 @@ use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;
 use super::source::Source;
 use crate::base::statistics::median;
+use crate::catalog::Catalog;
+use crate::ephemeris::solar_system::{Body, BodyKind, bodies_within};
 use crate::identify::{Identification, Priors, SourceIndex};
 use crate::photometry::instrumental_mag;
-use crate::sky::catalog::Catalog;
-use crate::sky::solar_system::{Body, BodyKind, bodies_within};
 use std::collections::HashMap;
 
 /// The largest radius of a body's disc: part of it may be in a frame whose corner it is beyond.
@@ -151,11 +151,11 @@ mod tests {
     use crate::base::coords::{PixelPoint, Rotation, UnitVector};
     use crate::base::epoch::ObservationDate;
     use crate::camera::CameraModel;
+    use crate::catalog::StarIndex;
+    use crate::ephemeris::places::StarPlaces;
+    use crate::ephemeris::solar_system::TimeError;
+    use crate::ephemeris::solar_system::bodies_at;
     use crate::identify::{DateSource, FrameDate, StarMatch};
-    use crate::sky::catalog::StarIndex;
-    use crate::sky::places::StarPlaces;
-    use crate::sky::solar_system::TimeError;
-    use crate::sky::solar_system::bodies_at;
     use nalgebra::Matrix3;
 
     const FOCAL_PX: f64 = 4000.0;

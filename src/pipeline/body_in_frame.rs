@@ -1,8 +1,8 @@
 //! The Moon or a planet within a frame.
 
 use crate::base::coords::PixelPoint;
+use crate::ephemeris::solar_system::{Body, BodyKind};
 use crate::identify::{Identification, SourceIndex};
-use crate::sky::solar_system::{Body, BodyKind};
 
 /// The Moon or a planet within a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

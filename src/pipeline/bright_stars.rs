@@ -1,10 +1,10 @@
 //! Bright stars without a name, and bright detections that are no star: what a person sees first.
 
+use crate::catalog::StarIndex;
 use crate::detect::{Detection, Detections};
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::{Identification, IndexedCatalog, PredictedStar, SkyView};
 use crate::photometry::resolved_px;
-use crate::sky::catalog::StarIndex;
-use crate::sky::places::StarPlaces;
 use std::collections::HashSet;
 use std::fmt;
 

@@ -5,8 +5,8 @@ use super::source::Source;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::DetectionFlags;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
-use crate::sky::places::StarPlaces;
 use std::collections::HashMap;
 
 /// Standard error assumed on each axis of a centroid that is listed without one, in pixels.

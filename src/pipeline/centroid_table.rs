@@ -259,9 +259,9 @@ pub(super) fn check_inside(
 mod tests {
     use super::*;
     use crate::detect::DetectionFlags;
+    use crate::ephemeris::places::StarPlaces;
     use crate::pipeline::LeftOut;
     use crate::pipeline::list_frame::ListFrame;
-    use crate::sky::places::StarPlaces;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
         CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())

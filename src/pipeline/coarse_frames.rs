@@ -6,9 +6,9 @@
 use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
 use crate::detect::{self, DetectConfig, detect};
+use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{CoarserFields, ObservedStar, StarField};
-use crate::sky::places::StarPlaces;
 use std::cell::{OnceCell, RefCell};
 
 /// Sides of the blocks of pixels that are averaged, the cheapest first.

@@ -8,12 +8,12 @@ use crate::base::size::Size;
 use crate::calibration::Calibration;
 use crate::camera::KnownLens;
 use crate::detect::{self, DetectConfig};
+use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::{self, Frame};
 use crate::identify::{
     self, DateSource, Effort, FrameDate, IndexedCatalog, NAME_ODDS, Priors, ScalePrior,
 };
 use crate::photometry::comparison::ObservingSetup;
-use crate::sky::places::AttitudeFrame;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;

@@ -5,11 +5,11 @@ use crate::base::neighbors::PointTree;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::CameraModel;
 use crate::detect::Detections;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::{
     Identification, IndexedCatalog, Priors, SkyRegion, SkyView, SourceIndex, StarMatch,
 };
-use crate::photometry::sky_map::{ClearSky, CurveEvidence, DarkLevel};
-use crate::sky::places::StarPlaces;
+use crate::sky::{ClearSky, CurveEvidence, DarkLevel};
 use nalgebra::Matrix3;
 use std::f64::consts::PI;
 

@@ -6,6 +6,8 @@ use super::outcome::{Outcome, Reason};
 use super::star_field::{field_of, star_field};
 use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{self, DetectConfig, Detection, Detections, detect};
+use crate::ephemeris::observer::Observation;
+use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
 use crate::frame::Frame;
 use crate::identify;
 use crate::identify::diagnosis::{
@@ -16,8 +18,6 @@ use crate::identify::{
     CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Priors,
     ScalePrior, SearchFailure, SourceIndex, StarField,
 };
-use crate::sky::observer::Observation;
-use crate::sky::places::{AttitudeFrame, StarPlaces};
 use std::collections::HashSet;
 
 /// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched

@@ -12,7 +12,10 @@ use crate::base::statistics::Estimate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::camera::KnownLens;
+use crate::catalog::Catalog;
 use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Trail, Wings};
+use crate::ephemeris::observer::Observation;
+use crate::ephemeris::solar_system::BodyKind;
 use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
@@ -20,9 +23,6 @@ use crate::identify::diagnosis::{DoubleImage, RepeatedSky};
 use crate::identify::{DateZone, Identification, Priors, ScalePrior, ScaleSource};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, ObservingSetup};
-use crate::sky::catalog::Catalog;
-use crate::sky::observer::Observation;
-use crate::sky::solar_system::BodyKind;
 use std::fmt;
 
 /// An error of the lens model, or of spots, that deserves a note, in pixels.

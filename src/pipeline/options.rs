@@ -7,13 +7,13 @@ use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::camera::data_sheet::{CameraDescription, DataSheet};
 use crate::detect::{CentroidMethod, DetectConfig};
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{
     DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion,
 };
 use crate::model::sensitivity::Extinction;
 use crate::photometry::comparison::ObservingSetup;
-use crate::sky::observer::Site;
-use crate::sky::places::AttitudeFrame;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 

@@ -7,16 +7,16 @@ use super::place_time::PlaceTime;
 use super::source::Source;
 use super::stopwatch::Timing;
 use crate::calibration::Applied;
+use crate::catalog::StarIndex;
 use crate::detect::Trail;
+use crate::ephemeris::observer::{Observation, Site};
+use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
 use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
-use crate::photometry::sky_map::SkyMap;
-use crate::sky::catalog::StarIndex;
-use crate::sky::observer::{Observation, Site};
-use crate::sky::places::AttitudeFrame;
+use crate::sky::SkyMap;
 
 /// What was found in one frame, or in one list of centroids.
 #[derive(Debug, Clone)]

@@ -17,10 +17,10 @@ use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
 use crate::detect::{self, DetectConfig, DetectError, Detections, Trail};
+use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
 use crate::photometry::PictureColors;
-use crate::sky::places::StarPlaces;
 use std::num::NonZeroUsize;
 use std::path::Path;
 

@@ -15,14 +15,14 @@ use crate::base::statistics::Estimate;
 use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::{Detections, SkyArea, Trail};
+use crate::ephemeris::observer::Observation;
+use crate::ephemeris::places::StarPlaces;
+use crate::ephemeris::solar_system::moon_and_sun;
 use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
-use crate::photometry::sky_map::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame, PictureColors};
-use crate::sky::observer::Observation;
-use crate::sky::places::StarPlaces;
-use crate::sky::solar_system::moon_and_sun;
+use crate::sky::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
 use std::collections::HashSet;
 
 /// What the stages found in a frame.
@@ -117,7 +117,7 @@ impl SolvedFrame<'_> {
         });
         let usual = usual.and_then(|usual| usual.clear_sky.as_ref());
         let measured = |usual| {
-            sky_map::measure(
+            sky::measure(
                 &frame,
                 &picture,
                 self.context.indexed,
@@ -133,8 +133,7 @@ impl SolvedFrame<'_> {
     /// Whether the frame is identified, and shows a wide field of a sky whose horizon is known.
     pub(super) fn shows_whole_sky(&self) -> bool {
         let found = self.outcome.identification();
-        found
-            .is_some_and(|found| found.places.zenith().is_some() && sky_map::is_wide(&found.camera))
+        found.is_some_and(|found| found.places.zenith().is_some() && sky::is_wide(&found.camera))
     }
 
     fn as_held(&self) -> Option<Identification> {
@@ -188,7 +187,7 @@ impl SolvedFrame<'_> {
             threshold_sigma,
             vignetting: self.stated_vignetting(),
             places: found
-                .filter(|found| sky_map::is_wide(&found.camera))
+                .filter(|found| sky::is_wide(&found.camera))
                 .and_then(|found| self.identified_frame(found).places_of_horizon()),
             wings: self.detections.wings.map_or(0.0, |wings| wings.share),
             spot_sigma_px: found.map(|_| spot_sigma_px),

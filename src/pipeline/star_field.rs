@@ -1,10 +1,10 @@
 //! The stars of a frame, as identification takes them.
 
 use crate::detect::{Detection, Detections};
+use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{ObservedStar, Photometry, SourceIndex, StarField};
 use crate::photometry::instrumental_mag;
-use crate::sky::places::StarPlaces;
 
 /// The detections that may be stars, as identification takes them.
 pub fn star_field(frame: &Frame, detections: &Detections, places: StarPlaces) -> StarField {

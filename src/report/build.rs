@@ -21,15 +21,15 @@ use crate::base::format::{
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::Applied;
 use crate::camera::CameraModel;
+use crate::catalog::Catalog;
+use crate::ephemeris::observer::Observation;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{DateZone, FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::MagnitudeBin;
 use crate::pipeline::{
     Background, Contradiction, Note, Outcome, PlaceTime, Proposal, Solution, Timing,
 };
-use crate::sky::catalog::Catalog;
-use crate::sky::observer::Observation;
-use crate::sky::places::AttitudeFrame;
 use nalgebra::Matrix3;
 
 impl FrameReport {

@@ -4,9 +4,9 @@ use super::sky::SkyReport;
 use crate::base::coords::PixelPoint;
 use crate::base::format::json_escaped;
 use crate::base::remedy::Remedy;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
-use crate::sky::places::AttitudeFrame;
 use serde::Serialize;
 use std::io;
 

@@ -42,11 +42,11 @@ fn region(star: &StarReport, x: f64, y: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::catalog::Catalog;
     use crate::frame::RowOrder;
     use crate::identify::SearchFailure;
     use crate::pipeline::{Outcome, Reason};
     use crate::report::sample;
-    use crate::sky::catalog::Catalog;
 
     #[test]
     fn regions_are_in_the_pixels_of_the_file() {

@@ -3,7 +3,7 @@
 use super::digits::{HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS, SHARE_DECIMALS};
 use crate::base::format::{significant, to_decimals};
 use crate::base::statistics::Estimate;
-use crate::photometry::sky_map::{Place, SkyCell, SkyMap, ToneFit, ZenithSky};
+use crate::sky::{Place, SkyCell, SkyMap, ToneFit, ZenithSky};
 use serde::Serialize;
 
 /// Significant digits of solid angles, luminances and probabilities.

@@ -7,10 +7,10 @@ use super::frame_report::StarReport;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::format::{finite, significant, to_decimals, turn_deg};
 use crate::base::units::DEG_PER_RAD;
+use crate::catalog::Catalog;
 use crate::detect::{DetectionFlags, Detections};
 use crate::identify::{Identification, StarMatch};
 use crate::pipeline::Source;
-use crate::sky::catalog::Catalog;
 
 /// The report of a detection that is not identified.
 pub(super) fn detection(source: &Source) -> StarReport {

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::base::remedy::Remedy;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
 use crate::identify::DateSource;
-use crate::sky::places::AttitudeFrame;
 
 fn star(x: f64, id: Option<&str>, name: Option<&str>) -> StarReport {
     StarReport {

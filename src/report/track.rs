@@ -249,7 +249,7 @@ fn axes(rad: &Vector3<f64>, digits: impl Fn(f64) -> Option<f64>) -> AxesReport {
 mod tests {
     use super::*;
     use crate::base::coords::{Rotation, UnitVector};
-    use crate::sky::places::{AttitudeFrame, StarPlaces};
+    use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
     use crate::track::Mode;
     use nalgebra::Matrix3;
 

@@ -9,9 +9,9 @@ use crate::base::format::{finite, to_decimals, to_significant, turn_deg};
 use crate::base::statistics::GAUSSIAN_FWHM;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::detect::Trail;
+use crate::ephemeris::observer::Observation;
 use crate::photometry::instrumental_mag;
 use crate::pipeline::Solution;
-use crate::sky::observer::Observation;
 
 /// The trails of a frame, where they were searched.
 pub(super) fn reports(solution: &Solution) -> Option<Vec<TrailReport>> {

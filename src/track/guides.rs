@@ -1,9 +1,9 @@
 //! The catalogue stars of a field that are tracked: bright enough, and alone.
 
 use crate::base::coords::{Icrs, UnitVector};
+use crate::catalog::StarIndex;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::IndexedCatalog;
-use crate::sky::catalog::StarIndex;
-use crate::sky::places::StarPlaces;
 
 /// Margin around a field, in units of its radius, within which stars are gathered, so that the next
 /// fields have theirs, too.

@@ -2,9 +2,9 @@
 
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::CameraModel;
+use crate::catalog::StarIndex;
+use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
 use crate::pipeline::Solution;
-use crate::sky::catalog::StarIndex;
-use crate::sky::places::{AttitudeFrame, StarPlaces};
 use nalgebra::{Matrix3, Vector3};
 
 /// How the attitude of a frame was found.

@@ -4,9 +4,9 @@ use super::outcome::Attitude;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::statistics::median;
 use crate::camera::CameraModel;
+use crate::catalog::StarIndex;
 use crate::identify::MIN_STARS;
 use crate::identify::fit::{CameraFit, MeasuredStar, fit_camera};
-use crate::sky::catalog::StarIndex;
 use nalgebra::Vector4;
 
 /// Largest residual of a star that belongs to the fit, in its errors, …

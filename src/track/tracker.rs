@@ -9,16 +9,16 @@ use super::pose::{PoseFitter, PosePrior, PoseStar};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::statistics::median;
 use crate::camera::CameraModel;
+use crate::catalog::Catalog;
 use crate::detect::DetectError;
 use crate::detect::windows::{ExpectedStar, FoundStar, SpotModel, WindowDetector};
+use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
 use crate::frame::{Frame, SaturationFinder};
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, MIN_STARS, Scale, ScalePrior, ScaleSource,
 };
 use crate::photometry::instrumental_mag;
 use crate::pipeline::{Context, Outcome, Solution, Workspace, solve_frame};
-use crate::sky::catalog::Catalog;
-use crate::sky::places::{AttitudeFrame, StarPlaces};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// Default number of stars that are tracked.

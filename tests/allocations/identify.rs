@@ -2,9 +2,9 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use starpipe::catalog::Catalog;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Protocol, SimulatedCentroids};
 
 fn allocations(work: impl FnOnce()) -> u64 {

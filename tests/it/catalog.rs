@@ -5,7 +5,7 @@ use flate2::read::GzDecoder;
 use proptest::prelude::*;
 use starpipe::base::coords::{Icrs, UnitVector};
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
-use starpipe::sky::catalog::{
+use starpipe::catalog::{
     Catalog, CatalogError, HipparcosId, ImportSummary, RecordLocation, Star, StarFlags, StarId,
     StarIndex, TychoId, sky2000,
 };
@@ -31,7 +31,7 @@ fn sky2000_file() -> Option<PathBuf> {
 
 /// A catalogue read from one file, and the summary of its records.
 fn import(path: &Path) -> Result<(Catalog, ImportSummary), CatalogError> {
-    let mut reading = starpipe::sky::catalog::import(path)?;
+    let mut reading = starpipe::catalog::import(path)?;
     assert_eq!(reading.files.len(), 1);
     Ok((reading.catalog, reading.files.remove(0).summary))
 }

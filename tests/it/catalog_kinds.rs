@@ -4,7 +4,7 @@ use crate::common::{Ran, Truth, fixture, gzip, number, shared_dir, starpipe};
 use proptest::prelude::*;
 use starpipe::base::coords::UnitVector;
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_DEG};
-use starpipe::sky::catalog::{Catalog, Reading, Star, StarFlags, StarId, StarIndex, TychoId};
+use starpipe::catalog::{Catalog, Reading, Star, StarFlags, StarId, StarIndex, TychoId};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,7 @@ impl Folder {
 }
 
 fn read(path: &Path) -> Reading {
-    starpipe::sky::catalog::read(path).unwrap()
+    starpipe::catalog::read(path).unwrap()
 }
 
 fn off_arcsec(star: &Star, ra_deg: f64, dec_deg: f64) -> f64 {
@@ -512,7 +512,7 @@ fn the_whole_of_tycho_2_becomes_stars() {
     let Some(_) = shared_dir() else { return };
     // It contains nearly all of SKY2000's bright stars, at the same position and magnitude.
     let bright: Vec<&Star> = Catalog::built_in().stars()[..15_424].iter().collect();
-    let grid = starpipe::sky::catalog::sky_grid::SkyGrid::new(reading.catalog.stars());
+    let grid = starpipe::catalog::sky_grid::SkyGrid::new(reading.catalog.stars());
     let has_twin = |star: &&&Star| {
         let mut twin = false;
         grid.for_each_within(
@@ -855,14 +855,14 @@ proptest! {
             // The bytes that identify the kind are kept.
             content[16..][at.index(source.len() - 16)] = byte;
         }
-        let _ = starpipe::sky::catalog::read(&folder.write("tyc2.dat", content));
+        let _ = starpipe::catalog::read(&folder.write("tyc2.dat", content));
     }
 
     #[test]
     fn any_cells_under_headings_are_refused_or_read_but_never_a_panic(content in "[-+0-9a-z:,.\"\n ]{0,120}") {
         let folder = Folder::new();
         let table = folder.write("table", format!("id,ra,dec,mag,pmra,pmdec,epoch\n{content}"));
-        let _ = starpipe::sky::catalog::read(&table);
+        let _ = starpipe::catalog::read(&table);
     }
 
     #[test]

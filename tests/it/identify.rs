@@ -7,11 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::camera::{CameraModel, Distortion, DistortionModel, focal_length_px};
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{
     Effort, Identification, ObservedStar, Photometry, Priors, ScalePrior, SearchFailure, SkyRegion,
     SourceIndex, StarField, StarMatch, Workspace, identify,
 };
-use starpipe::sky::places::StarPlaces;
 use std::f64::consts::{PI, TAU};
 
 const WIDTH_PX: f64 = 1024.0;

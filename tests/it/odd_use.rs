@@ -147,7 +147,7 @@ fn a_catalogue_without_stars_is_neither_made_nor_used() {
         ran.stderr
     );
     assert!(!output.exists());
-    starpipe::sky::catalog::Catalog::built_in()
+    starpipe::catalog::Catalog::built_in()
         .limited_to(-5.0)
         .write_compact(&output)
         .unwrap();

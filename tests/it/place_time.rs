@@ -5,9 +5,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use starpipe::camera::Projection;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{DateSource, DateZone, FrameDate, Photometry};
 use starpipe::pipeline::{Change, Contradiction, ListedCentroid, Note, PlaceTime};
-use starpipe::sky::places::StarPlaces;
 use starpipe::{
     CameraModel, CentroidList, Context, ObservationDate, PixelPoint, Rotation, Site, Solution,
     UnitVector, UtcOffset, Workspace, solve_centroids,

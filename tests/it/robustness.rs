@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
+use starpipe::catalog::StarIndex;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{Priors, identify};
-use starpipe::sky::catalog::StarIndex;
-use starpipe::sky::places::StarPlaces;
 use starpipe::study::robustness::{Answer, Mirrored, Protocol, SimulatedCentroids, TrialResult};
 
 fn draw(protocol: &Protocol, seed: u64) -> SimulatedCentroids {

@@ -1,7 +1,7 @@
 //! The stars: the bright ones are within the module, the whole catalog is given to it.
 
 use crate::told;
-use starpipe::sky::catalog::StarNumbers;
+use starpipe::catalog::StarNumbers;
 use starpipe::{Catalog, IndexedCatalog};
 use std::sync::OnceLock;
 use wasm_bindgen::prelude::*;

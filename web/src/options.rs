@@ -2,8 +2,8 @@
 
 use crate::told;
 use serde::Deserialize;
+use starpipe::ephemeris::observer::Site;
 use starpipe::identify::Effort;
-use starpipe::sky::observer::Site;
 use starpipe::{ObservationDate, SolveOptions};
 use std::num::NonZeroUsize;
 use wasm_bindgen::JsError;

@@ -6,9 +6,9 @@ use super::rows::changes_nothing;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, figure, options, table};
 use starpipe::base::format::five_digits;
+use starpipe::catalog::Catalog;
 use starpipe::model::sensitivity::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
 use starpipe::report::page::{Fact, Page};
-use starpipe::sky::catalog::Catalog;
 
 const PAPER: &str =
     "The equations are used as the paper's authors did. --reading physical corrects the physics.";

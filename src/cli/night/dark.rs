@@ -4,7 +4,7 @@ use super::read::of_each;
 use super::run::Run;
 use starpipe::frame::Frame;
 use starpipe::night::{FrameLevel, NightStart, dark_level, is_by_day};
-use starpipe::photometry::sky_map::DarkLevel;
+use starpipe::sky::DarkLevel;
 
 /// The level by frames of different exposure, where nothing else tells it.
 pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<DarkLevel> {

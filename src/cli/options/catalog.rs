@@ -6,8 +6,8 @@ use crate::cli::output::messages::{one_line, report_warning};
 use crate::cli::progress::bar;
 use clap::Args;
 use indicatif::ProgressBar;
+use starpipe::catalog::{self, Catalog};
 use starpipe::identify::{IndexedCatalog, cache_directory};
-use starpipe::sky::catalog::{self, Catalog};
 use std::borrow::Cow;
 use std::path::PathBuf;
 

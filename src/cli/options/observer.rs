@@ -2,7 +2,7 @@
 
 use super::values;
 use clap::Args;
-use starpipe::sky::observer::{Air, Site};
+use starpipe::ephemeris::observer::{Air, Site};
 
 #[derive(Debug, Args)]
 pub(crate) struct ObserverOptions {

@@ -1,7 +1,7 @@
 //! Parsers of option values, which refuse values out of range.
 
 use starpipe::base::angle::Angle;
-use starpipe::sky::observer::Air;
+use starpipe::ephemeris::observer::Air;
 use std::fmt::Display;
 
 /// Largest side of a frame, in pixels.

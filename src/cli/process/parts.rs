@@ -12,9 +12,9 @@ use starpipe::archive::{
     Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
 };
 use starpipe::base::format::counted;
+use starpipe::catalog::Catalog;
 use starpipe::frame::{Cameras, ImageName, PageChoice};
 use starpipe::report::{FrameReport, StarRow};
-use starpipe::sky::catalog::Catalog;
 use std::ops::ControlFlow;
 use std::path::Path;
 

@@ -3,11 +3,11 @@
 use super::subject::Subject;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
 use starpipe::base::epoch::ObservationDate;
+use starpipe::catalog::Catalog;
+use starpipe::ephemeris::observer::Site;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{Frame, FrameError, FrameMetadata};
 use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::observer::Site;
-use starpipe::sky::places::StarPlaces;
 use starpipe::study::validation::draw;
 
 /// Simulates frames of one subject with one camera.

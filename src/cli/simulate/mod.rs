@@ -21,9 +21,9 @@ use files::FrameFiles;
 use generator::Generator;
 use header::Description;
 use record::FrameRecord;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::model::sensitivity::{Budget, Detector, Rule};
 use starpipe::model::simulate::{Simulator, truth_table};
-use starpipe::sky::places::StarPlaces;
 use std::ops::ControlFlow;
 use subject::Subject;
 

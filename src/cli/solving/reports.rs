@@ -13,11 +13,11 @@ use indicatif::ProgressBar;
 use starpipe::archive::FrameRow;
 use starpipe::calibration::Calibration;
 use starpipe::camera::data_sheet::CameraDescription;
+use starpipe::catalog::Catalog;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
 use starpipe::pipeline::{Context, SolveOptions};
 use starpipe::report::FrameReport;
-use starpipe::sky::catalog::Catalog;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 

@@ -6,10 +6,10 @@ use crate::cli::input::stdin::is_stdin;
 use crate::cli::output::files::{NewFile, failures, make_directory, remove_outdated};
 use crate::cli::output::overwrite;
 use crate::cli::output::paths::output_path;
+use starpipe::catalog::Catalog;
 use starpipe::frame::{Buffers, Colors, Frame, ImageName, MemoryLimit, RowOrder};
 use starpipe::report::overlay::{self, Shown};
 use starpipe::report::{FrameReport, page, regions, sky_figure, tables, wcs};
-use starpipe::sky::catalog::Catalog;
 use std::path::{Path, PathBuf};
 
 /// Writes result files into a directory, if one is given.

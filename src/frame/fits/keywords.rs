@@ -23,11 +23,11 @@
 
 use super::header::{Header, parse_number};
 use crate::base::angle::Angle;
+use crate::ephemeris::observer::Site;
 use crate::frame::metadata::{
     ALTITUDE, EXPOSURE, FOCAL_LENGTH, FrameMetadata, HeaderNumber, PIXEL_SIZE,
 };
 use crate::frame::{BayerPattern, Frame, RowOrder};
-use crate::sky::observer::Site;
 
 /// Metadata from `keywords`.
 pub(super) fn metadata(keywords: &Keywords) -> FrameMetadata {

@@ -132,8 +132,8 @@ fn pairs(offsets: &[Offset], index: usize) -> Vec<Offset> {
 mod tests {
     use super::*;
     use crate::base::coords::PixelPoint;
+    use crate::ephemeris::places::StarPlaces;
     use crate::identify::{ObservedStar, Photometry, SourceIndex};
-    use crate::sky::places::StarPlaces;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

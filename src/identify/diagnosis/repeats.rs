@@ -272,8 +272,8 @@ fn log10_tail(tried: usize, hits: usize, probability: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ephemeris::places::StarPlaces;
     use crate::identify::{Photometry, SourceIndex};
-    use crate::sky::places::StarPlaces;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -7,8 +7,8 @@ use super::table::{CHUNKS, Place, Triangle};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
-use crate::sky::catalog::sky_grid::SkyGrid;
-use crate::sky::catalog::{Catalog, Star};
+use crate::catalog::sky_grid::SkyGrid;
+use crate::catalog::{Catalog, Star};
 use std::path::Path;
 
 /// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
@@ -246,7 +246,7 @@ impl MagnitudeCounts {
 mod tests {
     use super::*;
     use crate::base::coords::UnitVector;
-    use crate::sky::catalog::StarId;
+    use crate::catalog::StarId;
 
     fn small_catalog() -> Catalog {
         let star = |i: u32| {

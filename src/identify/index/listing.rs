@@ -14,8 +14,8 @@ use super::table::{MAX_STARS, SizeClass, Triangle};
 use super::triangle::TriangleShape;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
-use crate::sky::catalog::Star;
-use crate::sky::catalog::sky_grid::chord_of;
+use crate::catalog::Star;
+use crate::catalog::sky_grid::chord_of;
 use arrayvec::ArrayVec;
 use libm::log;
 use rayon::prelude::*;
@@ -270,7 +270,7 @@ fn distance_sq(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sky::catalog::Catalog;
+    use crate::catalog::Catalog;
 
     #[test]
     fn a_dense_catalogue_has_narrower_classes() {

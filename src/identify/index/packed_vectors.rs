@@ -1,7 +1,7 @@
 //! Unit vectors of stars in eight bytes each: those that a search needs again and again stay in the
 //! processor's cache.
 
-use crate::sky::catalog::Star;
+use crate::catalog::Star;
 
 /// Bits of a coordinate. Their step is 0.2 arcsec.
 const BITS: u32 = 21;
@@ -42,7 +42,7 @@ impl PackedVectors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sky::catalog::Catalog;
+    use crate::catalog::Catalog;
 
     #[test]
     fn vectors_come_back_to_a_fifth_of_an_arcsecond() {

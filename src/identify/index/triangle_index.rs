@@ -11,7 +11,7 @@ use super::cache::{CacheError, IndexFile};
 use super::listing::{ListedStar, class_limits_rad, list_class};
 use super::table::{SizeClass, Triangle};
 use crate::base::interrupt::{Interrupt, Interrupted};
-use crate::sky::catalog::Star;
+use crate::catalog::Star;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// All triangles, smallest class first.
@@ -109,8 +109,8 @@ mod tests {
     use super::super::triangle::TriangleShape;
     use super::*;
     use crate::base::coords::UnitVector;
+    use crate::catalog::Catalog;
     use crate::identify::index::cache;
-    use crate::sky::catalog::Catalog;
     use std::collections::HashSet;
 
     /// All triangles of a class.

@@ -15,10 +15,10 @@
 //! for the mean shift.
 
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::catalog::StarIndex;
+use crate::catalog::sky_grid::{GridStar, chord_of};
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::naming::{Candidate, position_density};
-use crate::sky::catalog::StarIndex;
-use crate::sky::catalog::sky_grid::{GridStar, chord_of};
 
 /// Stars fainter than another by more move its centroid by less than a hundredth of the spot.
 const FAINTER_MAG: f32 = 4.5;

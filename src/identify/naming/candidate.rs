@@ -1,9 +1,9 @@
 //! A pair of stars that may be one.
 
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::catalog::StarIndex;
 use crate::identify::pairing::{NearPair, Pair};
 use crate::identify::predict::PredictedStar;
-use crate::sky::catalog::StarIndex;
 
 /// An observed star and the catalogue star that it may be.
 #[derive(Debug, Clone, Copy, PartialEq)]

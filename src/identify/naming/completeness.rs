@@ -178,7 +178,7 @@ mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
 
-    use crate::sky::catalog::StarIndex;
+    use crate::catalog::StarIndex;
 
     fn field() -> StarField {
         StarField::of_places([1200.0, 1200.0], &[])

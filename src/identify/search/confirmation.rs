@@ -7,7 +7,7 @@
 
 use super::queries::ObservedStars;
 use crate::base::coords::{Icrs, UnitVector};
-use crate::sky::catalog::sky_grid::chord_of;
+use crate::catalog::sky_grid::chord_of;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 

@@ -4,8 +4,8 @@
 //! the camera in the sky (TRIAD) → cells of these, of the scale and of parity.
 
 use super::aligned::InCamera;
+use crate::catalog::sky_grid::chord_of;
 use crate::identify::priors::SkyRegion;
-use crate::sky::catalog::sky_grid::chord_of;
 use multiversion::multiversion;
 
 /// Size of a cell: of the optical axis in units of the field's width, …

@@ -16,6 +16,7 @@ use super::windows::Window;
 use crate::base::coords::{Rotation, UnitVector};
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
+use crate::catalog::sky_grid::GridStar;
 use crate::identify::effort::Effort;
 use crate::identify::field::{ObservedStar, StarField};
 use crate::identify::fit::{
@@ -24,7 +25,6 @@ use crate::identify::fit::{
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
 use crate::identify::priors::{Priors, SkyRegion};
-use crate::sky::catalog::sky_grid::GridStar;
 
 /// Margin on the fields of view that the index allows, so that a field of exactly that width is
 /// found.

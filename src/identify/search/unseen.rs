@@ -92,10 +92,10 @@ mod tests {
     use super::*;
     use crate::base::coords::{Rotation, UnitVector};
     use crate::camera::CameraModel;
+    use crate::catalog::Catalog;
     use crate::identify::field::StarField;
     use crate::identify::fit::POSE_PARAMETERS;
     use crate::identify::index::IndexedCatalog;
-    use crate::sky::catalog::Catalog;
 
     #[test]
     fn bright_stars_that_are_not_seen_speak_against_an_answer() {

@@ -15,7 +15,7 @@ use crate::CameraModel;
 use crate::base::coords::{PixelPoint, Rotation};
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::Projection;
-use crate::sky::places::StarPlaces;
+use crate::ephemeris::places::StarPlaces;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -257,7 +257,7 @@ fn lens_of(
 mod tests {
     use super::*;
     use crate::base::coords::{Icrs, UnitVector};
-    use crate::sky::observer::{Air, Site};
+    use crate::ephemeris::observer::{Air, Site};
     use std::f64::consts::PI;
 
     /// indi-allsky's pixel of an altitude and an azimuth, written from its description.

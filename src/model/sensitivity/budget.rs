@@ -7,7 +7,7 @@ use super::light::{
 };
 use super::scenario::{Reading, Scenario};
 use crate::base::units::ARCSEC_PER_RAD;
-use crate::sky::observer::airmass;
+use crate::ephemeris::observer::airmass;
 use serde::Serialize;
 
 /// A narrow band of the spectrum.

@@ -7,7 +7,7 @@ use super::prediction::Prediction;
 use super::scenario::Scenario;
 use super::sweep::Sweep;
 use crate::camera::data_sheet::{DataSheet, Preset};
-use crate::sky::catalog::Catalog;
+use crate::catalog::Catalog;
 use rayon::prelude::*;
 use serde::Serialize;
 

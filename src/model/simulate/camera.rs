@@ -4,7 +4,7 @@ use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::data_sheet::DataSheet;
 use crate::camera::{CameraModel, Distortion, DistortionModel, Projection};
-use crate::sky::places::StarPlaces;
+use crate::ephemeris::places::StarPlaces;
 
 /// Attitude of a frame, and where stars appear.
 #[derive(Debug, Clone, PartialEq)]

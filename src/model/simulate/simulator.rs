@@ -19,9 +19,9 @@ use super::true_sky::TrueSky;
 use super::truth::{TrueStar, Truth};
 use crate::base::coords::PixelPoint;
 use crate::camera::CameraModel;
+use crate::catalog::Star;
 use crate::frame::{self, Frame, FrameError};
 use crate::model::sensitivity::{Scenario, SkyBrightness, StarLight};
-use crate::sky::catalog::Star;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -44,7 +44,7 @@ fn random(seed: u64, stream: FrameStream) -> ChaCha8Rng {
 ///
 /// # Example
 /// ```
-/// use starpipe::sky::places::StarPlaces;
+/// use starpipe::ephemeris::places::StarPlaces;
 /// use starpipe::camera::data_sheet::DataSheet;
 /// use starpipe::model::sensitivity::Scenario;
 /// use starpipe::model::simulate::{Pointing, Setup, Simulator};

@@ -2,7 +2,7 @@
 
 use super::strays::{CosmicRay, Trail};
 use crate::base::coords::PixelPoint;
-use crate::sky::catalog::StarIndex;
+use crate::catalog::StarIndex;
 use nalgebra::Vector3;
 
 /// The ground truth of a frame.

@@ -5,7 +5,7 @@ use super::truth::{TrueStar, Truth};
 use crate::base::coords::PixelPoint;
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::CameraModel;
-use crate::sky::catalog::Catalog;
+use crate::catalog::Catalog;
 use serde::Serialize;
 
 /// A star, a trail or a cosmic ray.

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// −2.5 log10 of the ratio: Z + k (B−V − 0.6) + q (B−V − 0.6)².
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::photometry) struct ColorIndex {
+pub(crate) struct ColorIndex {
     coefficients: [f64; 3],
     covariance: Matrix3<f64>,
 }

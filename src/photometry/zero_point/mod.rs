@@ -26,7 +26,7 @@ mod relation;
 mod standard;
 mod weights;
 
-pub(super) use color_index::ColorIndex;
+pub(crate) use color_index::ColorIndex;
 #[doc(hidden)]
 pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor};
 pub use standard::{NoZeroPoint, ZeroPoint};

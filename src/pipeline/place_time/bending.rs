@@ -6,8 +6,8 @@
 
 use super::sky::{NamedStar, Sky};
 use crate::base::statistics::median;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::Identification;
-use crate::sky::places::StarPlaces;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// The comparison of refraction about different zeniths in one frame.

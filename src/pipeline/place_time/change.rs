@@ -5,7 +5,7 @@ use crate::base::clock::of_hours;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::DEG_PER_RAD;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 
 /// One thing that may be wrong with a place and a time.
 #[derive(Debug, Clone, Copy, PartialEq)]

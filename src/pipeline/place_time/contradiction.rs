@@ -1,6 +1,6 @@
 //! What contradicts a place and a time.
 
-use crate::sky::solar_system::BodyKind;
+use crate::ephemeris::solar_system::BodyKind;
 
 /// What contradicts a place and a time.
 #[derive(Debug, Clone, Copy, PartialEq)]

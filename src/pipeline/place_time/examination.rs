@@ -5,9 +5,9 @@ use super::contradiction::Contradiction;
 use super::sky::Sky;
 use super::sun;
 use crate::base::epoch::ObservationDate;
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::places::StarPlaces;
 use crate::pipeline::source::Source;
-use crate::sky::observer::Site;
-use crate::sky::places::StarPlaces;
 
 /// What a frame shows, ready to be held against places and times.
 pub(super) struct Examination<'a> {

@@ -35,10 +35,10 @@ use super::outcome::Outcome;
 use super::source::Source;
 use crate::base::clock::UtcOffset;
 use crate::base::epoch::ObservationDate;
+use crate::catalog::Catalog;
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::{DateZone, FrameDate, Priors};
-use crate::sky::catalog::Catalog;
-use crate::sky::observer::Site;
-use crate::sky::places::StarPlaces;
 use change::{Candidate, candidates};
 use examination::{Assessed, Examination};
 

@@ -5,7 +5,7 @@ use super::contradiction::Contradiction;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::counted;
 use crate::base::units::DEG_PER_RAD;
-use crate::sky::observer::{Observation, Site};
+use crate::ephemeris::observer::{Observation, Site};
 use std::fmt;
 
 /// A place and a time that the stars contradict.

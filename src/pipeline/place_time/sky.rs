@@ -3,8 +3,8 @@
 use super::super::source::Source;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::units::RAD_PER_DEG;
+use crate::catalog::Catalog;
 use crate::identify::{Identification, SourceIndex};
-use crate::sky::catalog::Catalog;
 
 /// A named star.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,8 @@ use super::sky::Sky;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
-use crate::sky::observer::Site;
-use crate::sky::solar_system::moon_and_sun;
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::solar_system::moon_and_sun;
 
 /// True altitude of the Sun, in radians.
 pub(super) fn altitude_rad(date: &ObservationDate, site: Site, zenith: &UnitVector<Icrs>) -> f64 {

@@ -3,7 +3,7 @@
 use super::examination::Examination;
 use crate::base::clock::of_hours;
 use crate::base::epoch::ObservationDate;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use jiff::SignedDuration;
 
 /// Zones that are no whole hour from UTC, in hours, and the longitudes where they are in use, in degrees.

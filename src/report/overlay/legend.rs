@@ -8,9 +8,9 @@ use crate::base::format::{counted, degrees, hours};
 use crate::base::size::Size;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::CameraModel;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::Identification;
 use crate::pipeline::Solution;
-use crate::sky::places::AttitudeFrame;
 
 // Lengths are in units of strokes.
 

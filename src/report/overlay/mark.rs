@@ -4,9 +4,9 @@ use super::canvas::{Canvas, Rgb};
 use super::names::StarLabel;
 use super::options::LabelKind;
 use super::picture::Picture;
+use crate::catalog::Catalog;
+use crate::ephemeris::solar_system::BodyKind;
 use crate::pipeline::{BodyInFrame, Solution, Source};
-use crate::sky::catalog::Catalog;
-use crate::sky::solar_system::BodyKind;
 
 /// Smallest and largest radius of a ring, in units of strokes.
 const RADIUS: (f32, f32) = (5.0, 15.0);

@@ -39,10 +39,10 @@ pub use letters::FONT;
 #[doc(hidden)]
 pub use svg::is_overlay as is_svg;
 
+use crate::catalog::Catalog;
 #[cfg(feature = "page")]
 use crate::frame::Frame;
 use crate::pipeline::{Background, Solution};
-use crate::sky::catalog::Catalog;
 use canvas::Canvas;
 use image::RgbImage;
 use mark::MarkKind;

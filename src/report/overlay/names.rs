@@ -1,8 +1,8 @@
 //! The label of a star: its name and magnitude.
 
 use super::options::LabelKind;
-use crate::sky::catalog::{Catalog, StarIndex};
-use crate::sky::solar_system::Body;
+use crate::catalog::{Catalog, StarIndex};
+use crate::ephemeris::solar_system::Body;
 
 /// SKY2000's abbreviations of the Greek letters.
 const GREEK: [(&str, char); 24] = [

@@ -5,13 +5,13 @@ use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::CameraModel;
+use crate::catalog::StarIndex;
 use crate::detect::DetectionFlags;
+use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
 use crate::pipeline::{Background, Measured, Outcome, Reason, Source};
 use crate::report::sample;
-use crate::sky::catalog::StarIndex;
-use crate::sky::places::StarPlaces;
 use nalgebra::Matrix3;
 
 const WIDTH: usize = 900;

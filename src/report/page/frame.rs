@@ -106,11 +106,11 @@ fn values(
 mod tests {
     use super::*;
     use crate::base::format::is_deceptive;
+    use crate::catalog::Catalog;
     use crate::identify::SearchFailure;
     use crate::pipeline::{Outcome, Reason};
     use crate::report::page::is_page;
     use crate::report::{frame_report::StarReport, sample};
-    use crate::sky::catalog::Catalog;
 
     /// A frame with one detection that is not identified.
     fn frame() -> (Solution, FrameReport) {

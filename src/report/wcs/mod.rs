@@ -19,12 +19,12 @@ mod sip;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
+use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::{
     COPY_CREATOR, FitsHeader, FitsSamples, FitsWriteError, Frame, RowOrder, write_rows,
 };
 use crate::identify::{Identification, SkyView};
 use crate::pipeline::{Outcome, Solution};
-use crate::sky::places::AttitudeFrame;
 use memchr::memmem;
 use nalgebra::{Matrix2, RowVector2, Vector3};
 use plane::Plane;

@@ -3,7 +3,7 @@
 use crate::base::coords::PixelPoint;
 use crate::base::epoch::ObservationDate;
 use crate::camera::data_sheet::Preset;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use serde::Deserialize;
 
 /// An experiment as it was published.

@@ -4,11 +4,11 @@ use super::published::{Published, PublishedStar};
 use crate::base::coords::PixelPoint;
 use crate::base::format::to_decimals;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::catalog::{Catalog, StarId, StarIndex};
+use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{Identification, Photometry, SourceIndex};
 use crate::model::sensitivity::{Budget, Scenario};
 use crate::pipeline::{CentroidList, ListedCentroid, Solution};
-use crate::sky::catalog::{Catalog, StarId, StarIndex};
-use crate::sky::places::AttitudeFrame;
 use serde::Serialize;
 
 /// The result of the paper's table.

@@ -3,12 +3,12 @@
 use crate::base::coords::{Camera, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::ephemeris::observer::Site;
+use crate::ephemeris::places::StarPlaces;
+use crate::ephemeris::solar_system::moon_and_sun;
 use crate::model::sensitivity::{Budget, Extinction, SkyBrightness};
 use crate::model::simulate::{Pointing, Scene, Setup, Simulator, camera_of};
 use crate::night::Almanac;
-use crate::sky::observer::Site;
-use crate::sky::places::StarPlaces;
-use crate::sky::solar_system::moon_and_sun;
 use crate::study::validation::ValidationError;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

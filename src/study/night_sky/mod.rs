@@ -23,11 +23,11 @@ pub use summary::{ClearTenth, GroupRow, SkySummary};
 pub use trial::{CellRow, FrameRow, SkyTrial};
 
 use crate::detect::DetectConfig;
+use crate::ephemeris::observer::Site;
 use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::simulate::{Setup, Simulator};
 use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::{Context, Workspace, solve_frame};
-use crate::sky::observer::Site;
 use crate::study::validation::ValidationError;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -2,7 +2,7 @@
 
 use super::trial::{CellRow, FrameRow, SkyTrial};
 use crate::base::format::{to_decimals, to_significant};
-use crate::photometry::sky_map::CLEAR_MAG;
+use crate::sky::CLEAR_MAG;
 use crate::study::robustness::Answer;
 use serde::Serialize;
 

@@ -3,8 +3,8 @@
 use super::conditions::Conditions;
 use super::truth::{TrueCell, Truth};
 use crate::base::format::to_decimals;
-use crate::photometry::sky_map::{Place, SkyCell, SkyMap};
 use crate::pipeline::Solution;
+use crate::sky::{Place, SkyCell, SkyMap};
 use crate::study::robustness::Answer;
 use serde::{Deserialize, Serialize};
 

@@ -5,11 +5,11 @@ use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::base::statistics::normal_cdf;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::detect::PIXEL_VARIANCE_PX2;
+use crate::ephemeris::observer::Site;
 use crate::identify::Identification;
 use crate::model::simulate::{Pointing, Simulator, TrueSky};
 use crate::photometry::filter_response;
-use crate::photometry::sky_map::{CLEAR_MAG, MOON_REACH_DEG, Place};
-use crate::sky::observer::Site;
+use crate::sky::{CLEAR_MAG, MOON_REACH_DEG, Place};
 use crate::study::robustness::Answer;
 use std::f64::consts::TAU;
 

@@ -34,8 +34,8 @@ pub use table::{
 };
 pub use trial::{Answer, TrialResult, TrialResults};
 
+use crate::ephemeris::places::StarPlaces;
 use crate::identify::{IndexedCatalog, identify};
-use crate::sky::places::StarPlaces;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

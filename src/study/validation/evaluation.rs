@@ -6,13 +6,13 @@ use super::validator::{SimulatedFrame, Validator};
 use crate::base::coords::small_turn_rad;
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
+use crate::catalog::StarIndex;
 use crate::identify::{Identification, SourceIndex};
 use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
 use crate::photometry::comparison::{expected_zero_point_vmag, fitted_color_effect_mag};
 use crate::photometry::{SUN_BV_MAG, filter_response};
 use crate::pipeline::{Note, Outcome, Solution, Source};
-use crate::sky::catalog::StarIndex;
 use crate::study::robustness::Answer;
 use std::collections::{HashMap, HashSet};
 

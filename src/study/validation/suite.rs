@@ -5,8 +5,8 @@ use super::summary::Summary;
 use super::validator::Protocol;
 use crate::camera::LENS_TERMS;
 use crate::camera::data_sheet::SpotForm;
+use crate::ephemeris::observer::Site;
 use crate::model::simulate::{Setup, camera_of};
-use crate::sky::observer::Site;
 use serde::Serialize;
 use std::fmt::Write as _;
 

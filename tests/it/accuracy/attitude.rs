@@ -9,12 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::base::statistics::median;
+use starpipe::catalog::Catalog;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::IndexedCatalog;
 use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
 use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
 use starpipe::pipeline::{Context, Workspace, solve_frame};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 use std::f64::consts::{PI, TAU};
 
 /// Approximate threshold of the detector in standard deviations.

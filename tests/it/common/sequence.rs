@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use starpipe::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use starpipe::camera::data_sheet::{DataSheet, Preset};
+use starpipe::catalog::Catalog;
+use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::Frame;
 use starpipe::model::sensitivity::Scenario;
 use starpipe::model::simulate::{Pointing, Scene, Simulator};
-use starpipe::sky::catalog::Catalog;
-use starpipe::sky::places::StarPlaces;
 
 /// Time from frame to frame, in seconds.
 pub const INTERVAL_S: f64 = 0.1;

@@ -13,7 +13,7 @@ pub use write::platepar;
 
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::epoch::ObservationDate;
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 
 /// Where a camera looked, from where, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::{Distortion, DistortionModel, Projection};
-use crate::sky::observer::Site;
+use crate::ephemeris::observer::Site;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 

@@ -3,8 +3,8 @@ use crate::base::coords::{Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::DistortionModel;
 use crate::camera::data_sheet::{DataSheet, Preset};
-use crate::sky::catalog::{StarId, StarIndex};
-use crate::sky::places::StarPlaces;
+use crate::catalog::{StarId, StarIndex};
+use crate::ephemeris::places::StarPlaces;
 
 fn pointing() -> Pointing {
     let boresight = UnitVector::from_ra_dec(1.0, 0.3);

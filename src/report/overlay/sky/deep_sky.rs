@@ -1,9 +1,9 @@
 //! Clusters, nebulae and galaxies.
 
 use super::view::View;
+use crate::catalog::objects::deep_sky;
 use crate::report::overlay::canvas::{Canvas, Rgb};
 use crate::report::overlay::labels::Room;
-use crate::sky::objects::deep_sky;
 
 const COLOR: Rgb = Rgb([150, 220, 150]);
 /// Size of the letters, in units of strokes.

@@ -2,9 +2,9 @@
 
 use super::view::View;
 use crate::base::coords::{Icrs, UnitVector};
+use crate::catalog::objects::constellations;
 use crate::report::overlay::canvas::{Canvas, Rgb};
 use crate::report::overlay::labels::Room;
-use crate::sky::objects::constellations;
 
 const COLOR: Rgb = Rgb([120, 135, 190]);
 /// Size of the letters, in units of strokes.

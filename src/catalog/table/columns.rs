@@ -1,0 +1,97 @@
+//! The columns of a general table.
+
+use super::headings::{Heading, HeadingUnit, find_column};
+use super::roles::{Epoch, IdColumns, MagnitudeColumns, MotionColumns, PositionColumns};
+use crate::catalog::error::RecordLocation;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The columns of a table by what they hold.
+pub(super) struct GeneralColumns {
+    /// The headings as in the file.
+    pub(super) texts: Vec<String>,
+    pub(super) id: IdColumns,
+    pub(super) name: Option<usize>,
+    pub(super) position: PositionColumns,
+    pub(super) magnitude: MagnitudeColumns,
+    pub(super) b_minus_v: Option<usize>,
+    pub(super) motion: Option<MotionColumns>,
+    pub(super) epoch: Epoch,
+    /// An angle was sexagesimal, so its unit is certain.
+    pub(super) sexagesimal_seen: AtomicBool,
+}
+
+impl GeneralColumns {
+    /// Finds the columns from `headings`. `note_of` gives what the file says about a column.
+    ///
+    /// # Errors
+    /// The missing columns; none if the table does not seem to be one of stars.
+    pub(super) fn find(
+        headings: &[Heading],
+        note_of: impl Fn(&str) -> Option<String>,
+    ) -> Result<Self, Vec<&'static str>> {
+        let id =
+            IdColumns::find(headings).ok_or("of identifiers (id, name, hip, tyc, source_id, ...)");
+        let position = PositionColumns::find(headings)
+            .ok_or("of right ascensions and declinations (ra and dec, raj2000 and dej2000, ...)");
+        let magnitude = MagnitudeColumns::find(headings)
+            .ok_or("of magnitudes (vmag, mag, vtmag, phot_g_mean_mag, ...)");
+        let (id, position, magnitude) = match (id, position, magnitude) {
+            (Ok(id), Ok(position), Ok(magnitude)) => (id, position, magnitude),
+            (_, Err(_), Err(_)) => return Err(Vec::new()),
+            (id, position, magnitude) => {
+                let missing = [id.err(), position.err(), magnitude.err()];
+                return Err(missing.into_iter().flatten().collect());
+            }
+        };
+        let ra = &headings[position.ra.cell];
+        let epoch = Epoch::find(headings, ra, &note_of(&ra.text).unwrap_or_default());
+        let name = find_column(headings, "name proper");
+        Ok(Self {
+            texts: headings
+                .iter()
+                .map(|heading| heading.text.clone())
+                .collect(),
+            name: name.filter(|cell| !id.cells.contains(cell)),
+            id,
+            position,
+            magnitude,
+            b_minus_v: find_column(headings, "b-v b_v bv b_minus_v"),
+            motion: MotionColumns::find(headings),
+            epoch,
+            sexagesimal_seen: AtomicBool::new(false),
+        })
+    }
+
+    /// The columns used, for people.
+    pub(super) fn description(&self) -> String {
+        let text = |cell: usize| self.texts[cell].as_str();
+        let id: Vec<&str> = self.id.cells.iter().map(|&cell| text(cell)).collect();
+        let motion = match &self.motion {
+            Some(motion) => format!("proper motion {} and {}", text(motion.ra), text(motion.dec)),
+            None => "no proper motion".to_owned(),
+        };
+        let epoch = match self.epoch {
+            Epoch::Column(cell) => format!("epoch {}", text(cell)),
+            Epoch::Year(year) => format!("epoch J{year}"),
+        };
+        format!(
+            "identifier {}, position {} and {}, {}, {motion}, {epoch}",
+            id.join("-"),
+            text(self.position.ra.cell),
+            text(self.position.dec.cell),
+            self.magnitude.description(text),
+        )
+    }
+
+    /// Where in a row the identifier is, and its heading.
+    pub(super) fn id_location(&self) -> (RecordLocation, String) {
+        let cell = self.id.cells[0];
+        (RecordLocation::Column(cell + 1), self.texts[cell].clone())
+    }
+
+    /// Whether all right ascensions are decimal numbers, read as degrees.
+    pub(super) fn has_decimal_degrees(&self) -> bool {
+        let decimal = !self.sexagesimal_seen.load(Ordering::Relaxed);
+        decimal && matches!(self.position.ra.unit, None | Some(HeadingUnit::Degrees))
+    }
+}

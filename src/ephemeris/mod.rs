@@ -1,0 +1,9 @@
+//! From where and when does one look? Site and atmosphere; places of stars; Moon and planets.
+//!
+//! - [`observer`]: site, date and direction → zenith distance, azimuth and airmass.
+//! - [`places`]: a star, date, site and velocity → where the star appears.
+//! - [`solar_system`]: date and site → the Moon and the planets.
+
+pub mod observer;
+pub mod places;
+pub mod solar_system;
