@@ -43,7 +43,6 @@ const ROOMS: &[(&str, &[&str])] = &[
         "sky",
         &[
             "base",
-            "catalog",
             "ephemeris",
             "frame",
             "camera",
