@@ -8,7 +8,7 @@ use super::direction_scatter::variance_factor;
 use super::formats::Pointing;
 use super::frames::{LeftOutFrame, LensFrame, Unfit};
 use super::mount::Mount;
-use super::repeats::{CommonError, Repeats};
+use super::repeats::{CommonError, Repeats, StarError};
 use super::scale_drift::{FrameScale, ScaleDrift};
 use crate::base::statistics::median;
 use crate::camera::{CameraModel, KnownLens};
@@ -218,7 +218,7 @@ impl Fitted {
         // Residuals tell the errors, and these weigh the stars for the choice of a lens.
         let first = fit_jointly(&stated, &start, start.distortion_model())?;
         let (mut errors, mut weighted) = reweighed(&stated, &first, &repeats);
-        let tested = best_lens(&weighted, &repeats, &first.camera)?;
+        let tested = best_lens(&weighted, &repeats, errors.independent_stars, &first.camera)?;
         let mut fit = fit_jointly(
             &weighted,
             &first.camera.reprojected(tested.projection),
@@ -384,6 +384,8 @@ struct Errors {
     excess_sigma_px: f64,
     /// What frames of one direction have in common.
     common: CommonError,
+    /// As many stars without anything in common tell as much.
+    independent_stars: f64,
 }
 
 /// The errors that the residuals of `fit` show, and the stars with them; outliers have larger ones.
@@ -394,22 +396,40 @@ fn reweighed(
 ) -> (Errors, Vec<JointFrame>) {
     let excess_sigma_px = excess_sigma_px(stated, fit);
     let common = repeats.common_error(stated, fit, excess_sigma_px);
-    let frames = stated.iter().zip(&fit.attitudes).zip(&fit.residuals_px);
-    let frames = frames.zip(&repeats.places);
-    let weighted = frames.map(|(((frame, attitude), residuals), places)| {
-        let mut frame = frame.clone();
-        frame.icrs_to_camera = *attitude;
-        for ((star, [x, y]), place) in frame.stars.iter_mut().zip(residuals).zip(places) {
-            let sigma_px = libm::hypot(star.sigma_px, excess_sigma_px);
-            let sigma_px = robust_sigma_px(sigma_px, libm::hypot(*x, *y));
-            star.sigma_px = repeats.sigma_px(*place, &common, [star.sigma_px, sigma_px]);
-        }
-        frame
+    let alone = stated.iter().zip(&fit.residuals_px);
+    let alone = alone.map(|(frame, residuals)| {
+        let stars = frame.stars.iter().zip(residuals);
+        stars
+            .map(|(star, residual)| {
+                let [x, y] = *residual;
+                let sigma_px = libm::hypot(star.sigma_px, excess_sigma_px);
+                StarError {
+                    noise_px: star.sigma_px,
+                    sigma_px: robust_sigma_px(sigma_px, libm::hypot(x, y)),
+                    residual_px: *residual,
+                }
+            })
+            .collect()
     });
+    let alone: Vec<Vec<StarError>> = alone.collect();
+    let sigmas_px = repeats.sigmas_px(&common, &alone);
+    let counted = alone.iter().flatten().zip(sigmas_px.iter().flatten());
     let errors = Errors {
         excess_sigma_px,
         common,
+        independent_stars: counted
+            .map(|(star, sigma_px)| (star.sigma_px / sigma_px).powi(2))
+            .sum(),
     };
+    let frames = stated.iter().zip(&fit.attitudes).zip(&sigmas_px);
+    let weighted = frames.map(|((frame, attitude), sigmas_px)| {
+        let mut frame = frame.clone();
+        frame.icrs_to_camera = *attitude;
+        for (star, sigma_px) in frame.stars.iter_mut().zip(sigmas_px) {
+            star.sigma_px = *sigma_px;
+        }
+        frame
+    });
     (errors, weighted.collect())
 }
 

@@ -25,14 +25,15 @@ pub(super) struct Tested {
 }
 
 /// The lens that predicts left-out stars best for its number of terms. Only a wide field tells
-/// projections apart. `None` where no lens can be fitted.
+/// projections apart. `None` where no lens can be fitted. The frames tell as much as `stars` that have nothing in
+/// common.
 pub(super) fn best_lens(
     frames: &[JointFrame],
     repeats: &Repeats,
+    stars: f64,
     start: &CameraModel,
 ) -> Option<Tested> {
-    let stars: usize = frames.iter().map(|frame| frame.stars.len()).sum();
-    let equations = 2.0 * stars as f64;
+    let equations = 2.0 * stars;
     let projections = if start.radius_rad() > WIDE_RAD {
         Projection::ALL.to_vec()
     } else {
@@ -55,12 +56,12 @@ pub(super) fn best_lens(
 }
 
 /// The simplest distortion that no richer one clearly surpasses.
-fn best_model(frames: &Parted, start: &CameraModel, stars: usize) -> Option<Tested> {
-    let equations = 2.0 * stars as f64;
+fn best_model(frames: &Parted, start: &CameraModel, stars: f64) -> Option<Tested> {
+    let equations = 2.0 * stars;
     let mut best: Option<Tested> = None;
     let models = DistortionModel::ALL.map(Some);
     for model in std::iter::once(None).chain(models) {
-        if model.is_some_and(|model| !is_affordable(model, stars)) {
+        if model.is_some_and(|model| !is_affordable(model, stars as usize)) {
             break;
         }
         let Some(tested) = test(frames, start, model) else {

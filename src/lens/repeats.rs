@@ -9,7 +9,7 @@
 use super::frames::LensFrame;
 use crate::base::statistics::median;
 use crate::catalog::StarIndex;
-use crate::identify::fit::{JointFit, JointFrame};
+use crate::identify::fit::{JointFit, JointFrame, robust_sigma_px};
 use std::collections::HashMap;
 
 /// Where the stars of frames repeat: a place is a star in the frames of one direction.
@@ -106,18 +106,86 @@ impl Repeats {
         CommonError::of(&places, left.max(0.25))
     }
 
-    /// The standard error with which a star counts: `noise_px` is that of its centroid, `sigma_px` that of all
-    /// its errors.
-    pub(super) fn sigma_px(
+    /// The standard errors with which the stars of frames count, where `common` is in common and each alone has
+    /// those of `of_stars`: variances of centroids and of all errors, and residuals.
+    pub(super) fn sigmas_px(
         &self,
-        place: usize,
         common: &CommonError,
-        [noise_px, sigma_px]: [f64; 2],
-    ) -> f64 {
-        let others = (self.observations[place] - 1) as f64;
-        let variance = sigma_px * sigma_px;
-        let in_common = common.noise_share * noise_px * noise_px + common.variance_px2;
-        (variance + others * in_common.min(variance)).sqrt()
+        of_stars: &[Vec<StarError>],
+    ) -> Vec<Vec<f64>> {
+        let mut means = vec![MeanResidual::default(); self.place_count()];
+        let stars = of_stars.iter().zip(&self.places);
+        for (star, place) in stars
+            .clone()
+            .flat_map(|(stars, places)| stars.iter().zip(places))
+        {
+            means[*place].add(star, star.in_common(common));
+        }
+        let sigma_px = |star: &StarError, mean: &MeanResidual| {
+            let others = mean.observations - 1.0;
+            let variance_px2 = star.sigma_px * star.sigma_px + others * star.in_common(common);
+            (variance_px2 + mean.observations * mean.excess_px2()).sqrt()
+        };
+        let of_frame = |(stars, places): (&Vec<StarError>, &Vec<usize>)| {
+            let stars = stars.iter().zip(places);
+            stars
+                .map(|(star, place)| sigma_px(star, &means[*place]))
+                .collect()
+        };
+        stars.map(of_frame).collect()
+    }
+}
+
+/// The error of a star in one frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StarError {
+    /// Standard error of its centroid on each axis.
+    pub noise_px: f64,
+    /// The same of all its errors.
+    pub sigma_px: f64,
+    pub residual_px: [f64; 2],
+}
+
+impl StarError {
+    /// Its variance on each axis that other frames repeat.
+    fn in_common(&self, common: &CommonError) -> f64 {
+        common
+            .sigma_px(self.noise_px)
+            .powi(2)
+            .min(self.sigma_px.powi(2))
+    }
+}
+
+/// The mean residual at a place.
+#[derive(Debug, Clone, Copy, Default)]
+struct MeanResidual {
+    observations: f64,
+    residuals_px: [f64; 2],
+    /// Sums of the variances of the observations, and of what is in common.
+    variances_px2: f64,
+    common_px2: f64,
+}
+
+impl MeanResidual {
+    fn add(&mut self, star: &StarError, common_px2: f64) {
+        self.observations += 1.0;
+        self.variances_px2 += star.sigma_px * star.sigma_px;
+        self.common_px2 += common_px2;
+        for (sum, along) in self.residuals_px.iter_mut().zip(star.residual_px) {
+            *sum += along;
+        }
+    }
+
+    /// The variance that the mean of an outlier has beyond the usual one: all frames repeat it.
+    fn excess_px2(&self) -> f64 {
+        if self.observations < 2.0 {
+            return 0.0;
+        }
+        let [common_px2, single_px2] = [self.common_px2, self.variances_px2 - self.common_px2]
+            .map(|sum| sum / self.observations);
+        let variance_px2 = common_px2 + single_px2 / self.observations;
+        let [x, y] = self.residuals_px.map(|sum| sum / self.observations);
+        robust_sigma_px(variance_px2.sqrt(), libm::hypot(x, y)).powi(2) - variance_px2
     }
 }
 
@@ -255,5 +323,40 @@ mod tests {
         }
         let single = CommonError::of(&[Products::default()], 1.0);
         assert_eq!(single, CommonError::default());
+    }
+
+    #[test]
+    fn what_all_frames_repeat_counts_once() {
+        const FRAMES: usize = 8;
+        let repeats = Repeats {
+            directions: vec![0; FRAMES],
+            places: vec![vec![0, 1, 2]; FRAMES],
+            observations: vec![FRAMES; 3],
+            first_indices: vec![0, 1, 2],
+        };
+        let common = CommonError {
+            noise_share: 0.0,
+            variance_px2: 0.06 * 0.06,
+        };
+        let star = |residual_px| StarError {
+            noise_px: 0.08,
+            sigma_px: robust_sigma_px(0.1, residual_px),
+            residual_px: [residual_px, 0.0],
+        };
+        // The second has a neighbour; the third was hit by a cosmic ray in one frame.
+        let mut of_stars = vec![vec![star(0.05), star(1.0), star(0.0)]; FRAMES];
+        of_stars[0][2] = star(1.0);
+        let of_star = |index: usize| {
+            let sigmas_px = repeats.sigmas_px(&common, &of_stars);
+            let weights = sigmas_px.iter().map(|frame| frame[index].powi(-2));
+            weights.sum::<f64>().sqrt().recip()
+        };
+        let usual_px = (0.06_f64.powi(2) + 0.08_f64.powi(2) / FRAMES as f64).sqrt();
+        assert!((of_star(0) - usual_px).abs() < 1e-12);
+        // It pulls no harder than a residual of 2.5 standard errors.
+        let outlier_px = of_star(1);
+        assert!(1.0 / outlier_px.powi(2) < 2.6 / usual_px, "{outlier_px}");
+        let hit_px = of_star(2);
+        assert!(hit_px < 1.6 * usual_px, "{hit_px}");
     }
 }
