@@ -2,7 +2,7 @@
 """Checks platepars against RMS's formulas, written anew from their description.
 
     check-platepar.py PLATEPAR STARS   compares with stars, one a line: RA DEC X Y (J2000 degrees, pixels)
-    check-platepar.py                  prints the pixels that the tests in src/lens/formats/platepar expect
+    check-platepar.py                  prints the pixels that the tests in src/camera/formats/platepar expect
 
 Formulas: Croatian Meteor Network, RMS, RMS/Astrometry/CyFunctions.pyx.
 """

@@ -45,15 +45,14 @@
 //! | [`catalog`] | which stars there are |
 //! | [`ephemeris`] | from where and when one looks: observer, places of stars, Moon and planets |
 //! | [`frame`] | what a file holds: readers, writers, metadata |
-//! | [`camera`] | what instrument: geometry, data sheet |
+//! | [`camera`] | what instrument: geometry, data sheet, lenses in files of other programs |
 //! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |
 //! | [`detect`](mod@detect) | where is light: background, threshold, centroids |
-//! | [`identify`](mod@identify) | which stars, which attitude, or why not |
+//! | [`identify`](mod@identify) | which stars, which attitude, or why not; which lens, from several frames |
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`sky`] | how bright is the sky, how clear, and how faint do stars go at each place |
 //! | [`pipeline`] | what does a frame show: the stages in order |
-//! | [`lens`] | which lens, from several frames of a camera at once |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
@@ -83,7 +82,6 @@ pub mod detect;
 pub mod ephemeris;
 pub mod frame;
 pub mod identify;
-pub mod lens;
 pub mod model;
 #[doc(hidden)]
 pub mod night;

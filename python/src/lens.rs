@@ -3,7 +3,7 @@
 use crate::errors::{detached, exception, json};
 use crate::solved::Solved;
 use pyo3::prelude::*;
-use starpipe::lens::{self, LeftOutFrame, LensFrame};
+use starpipe::identify::lens::{self, LeftOutFrame, LensFrame};
 use starpipe::report::LensReport;
 
 /// The report of a calibration as the program's JSON, and the table `[lens]` of a description.
@@ -11,7 +11,7 @@ use starpipe::report::LensReport;
 pub fn calibrate(py: Python<'_>, solved: Vec<PyRef<'_, Solved>>) -> PyResult<(String, String)> {
     let (mut frames, mut left_out) = (Vec::new(), Vec::new());
     for frame in &solved {
-        match LensFrame::new(&frame.name, &frame.solution) {
+        match frame.solution.lens_frame(&frame.name) {
             Ok(frame) => frames.push(frame),
             Err(why) => left_out.push(LeftOutFrame {
                 name: frame.name.clone(),

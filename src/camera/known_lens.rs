@@ -8,7 +8,7 @@ use crate::base::units::DEG_PER_RAD;
 use nalgebra::{DMatrix, DVector, Matrix3};
 use std::fmt::Write as _;
 
-/// A lens that was measured, as by [`crate::lens::calibrate`].
+/// A lens that was measured, as by [`crate::identify::lens::calibrate`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownLens {
     camera: CameraModel,

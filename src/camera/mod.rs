@@ -4,12 +4,14 @@
 //! - [`data_sheet`]: `camera.toml` → [`DataSheet`](data_sheet::DataSheet), pixels, lens and
 //!   detector.
 //! - [`KnownLens`]: a camera model that was measured, with its errors.
+//! - [`formats`]: lenses in the files of other programs.
 //!
 //! direction → axes of the lens → [`Projection`] → [`Distortion`] → offset from the frame's centre (x
 //! reversed if the frame is mirrored) → pixel; and the same way back.
 
 pub mod data_sheet;
 mod distortion;
+pub mod formats;
 mod frame_size;
 mod known_lens;
 mod model;

@@ -13,6 +13,8 @@
 //!    attitude are fitted to the sure names alone.
 //! 4. [`diagnosis`]: where nothing is identified, why.
 //!
+//! [`lens`]: the lens of a camera, measured in several of its frames.
+//!
 //! Caveats: fields from about 1.5° to 80°, a pinhole camera with the optical axis at the frame's
 //! centre and a distortion up to seventh order (radial) or fifth order (any), at least [`MIN_STARS`]
 //! stars of the catalogue.
@@ -26,6 +28,7 @@ mod grid;
 mod hypothesis;
 mod identification;
 mod index;
+pub mod lens;
 mod naming;
 mod pairing;
 #[cfg(debug_assertions)]

@@ -4,8 +4,8 @@ use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::statistics::median;
 use crate::camera::KnownLens;
 use crate::ephemeris::observer::Site;
+use crate::identify::lens::{LensFrame, calibrate};
 use crate::identify::{DateZone, Identification};
-use crate::lens::{LensFrame, calibrate};
 use crate::pipeline::{HeldCamera, Outcome, Solution};
 use crate::sky::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use jiff::SignedDuration;
@@ -45,7 +45,7 @@ impl Probe {
         };
         let date = solution.date.map(|known| known.date);
         Some(Self {
-            stars: LensFrame::new(name, solution).ok()?,
+            stars: solution.lens_frame(name).ok()?,
             camera: KnownLens::with_assumed_errors(found.camera)?,
             mjd: date.and_then(|date| date.modified_julian_date()),
             pointing: horizon_attitude(found),

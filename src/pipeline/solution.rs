@@ -2,7 +2,7 @@
 
 use super::body_in_frame::BodyInFrame;
 use super::note::Note;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Reason};
 use super::place_time::PlaceTime;
 use super::source::Source;
 use super::stopwatch::Timing;
@@ -13,6 +13,7 @@ use crate::ephemeris::observer::{Observation, Site};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
+use crate::identify::lens::{LensFrame, Unfit};
 use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
@@ -117,6 +118,23 @@ impl Solution {
             };
             sigma_px.is_finite().then_some((named.star, star))
         })
+    }
+
+    /// The stars of the frame, which has this name, for [`calibrate`](crate::identify::lens::calibrate()).
+    ///
+    /// # Errors
+    /// [`Unfit::NotIdentified`].
+    pub fn lens_frame(&self, name: &str) -> Result<LensFrame, Unfit> {
+        match &self.outcome {
+            Outcome::Identified(found) => {
+                let frame = LensFrame::new(name, found, self.named_stars(found));
+                let date = self.date.map(|known| known.date);
+                Ok(frame.taken(date, self.observation))
+            }
+            Outcome::NotIdentified(reason) => Err(Unfit::NotIdentified {
+                code: Reason::code(reason),
+            }),
+        }
     }
 }
 

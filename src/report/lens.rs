@@ -4,7 +4,7 @@ use super::SCHEMA;
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::camera::CameraModel;
-use crate::lens::{Coverage, LeftOutFrame, LensCalibration, UsedFrame};
+use crate::identify::lens::{Coverage, LeftOutFrame, LensCalibration, UsedFrame};
 use serde::Serialize;
 use std::fmt::Write as _;
 

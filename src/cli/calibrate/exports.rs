@@ -3,8 +3,10 @@
 use crate::cli::output::files::NewFile;
 use anyhow::{Context as _, anyhow};
 use clap::Args;
-use starpipe::lens::LensCalibration;
-use starpipe::lens::formats::{Pointing, indi_allsky_json, opencv_yaml, platepar, ros_camera_info};
+use starpipe::camera::formats::{
+    Pointing, indi_allsky_json, opencv_yaml, platepar, ros_camera_info,
+};
+use starpipe::identify::lens::LensCalibration;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

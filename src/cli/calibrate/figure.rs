@@ -2,7 +2,7 @@
 
 use crate::cli::plot::{Axis, BLACK, BLUE, Cell, Layer, Marks, Panel, Sheet};
 use plotters::style::RGBColor;
-use starpipe::lens::{Coverage, CoverageCell, LensCalibration};
+use starpipe::identify::lens::{Coverage, CoverageCell, LensCalibration};
 
 /// Length of the longest arrow, in cells.
 const LONGEST: f64 = 0.9;

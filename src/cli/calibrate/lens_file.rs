@@ -2,7 +2,7 @@
 
 use crate::cli::exit::CommandError;
 use anyhow::Context as _;
-use starpipe::lens::{LensCalibration, MEASURED_BY};
+use starpipe::identify::lens::{LensCalibration, MEASURED_BY};
 use std::path::Path;
 
 /// Refuses to overwrite one of these files.

@@ -22,7 +22,7 @@ use super::solving::{Inputs, Plan, Sink, Solved, Solver};
 use clap::Args;
 use exports::ExportOptions;
 use starpipe::frame::{Cameras, ImageName, PageChoice};
-use starpipe::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
+use starpipe::identify::lens::{LeftOutFrame, LensCalibration, LensFrame, calibrate as measure};
 use starpipe::report::LensReport;
 use starpipe::report::page::Fact;
 use std::ops::ControlFlow;
@@ -149,7 +149,10 @@ impl Sink for Stars {
 
     fn make(&self, image: &ImageName, solved: &Solved) -> Taken {
         let name = image.to_string();
-        LensFrame::new(&name, &solved.solution).map_err(|why| LeftOutFrame { name, why })
+        solved
+            .solution
+            .lens_frame(&name)
+            .map_err(|why| LeftOutFrame { name, why })
     }
 }
 

@@ -4,7 +4,7 @@ use super::figure::sheet;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{figure, options, table, thumbnails};
 use starpipe::base::format::counted;
-use starpipe::lens::LensCalibration;
+use starpipe::identify::lens::LensCalibration;
 use starpipe::report::LensReport;
 use starpipe::report::page::{Fact, Page};
 

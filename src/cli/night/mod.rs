@@ -25,7 +25,7 @@ use run::{BATCH, Measured, Run};
 use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::catalog::Catalog;
 use starpipe::frame::Cameras;
-use starpipe::lens::MEASURED_BY;
+use starpipe::identify::lens::MEASURED_BY;
 use starpipe::night::{PassedOverFiles, SkyglowStation, summarize};
 use std::fs;
 use std::num::NonZeroUsize;

@@ -15,7 +15,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("catalog", &["base"]),
     ("ephemeris", &["base", "catalog"]),
     ("frame", &["base", "ephemeris"]),
-    ("camera", &["base"]),
+    ("camera", &["base", "ephemeris"]),
     ("calibration", &["base", "frame"]),
     ("detect", &["base", "frame"]),
     (
@@ -69,17 +69,6 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "lens",
-        &[
-            "base",
-            "catalog",
-            "ephemeris",
-            "camera",
-            "identify",
-            "pipeline",
-        ],
-    ),
-    (
         "track",
         &[
             "base",
@@ -107,7 +96,6 @@ const ROOMS: &[(&str, &[&str])] = &[
             "photometry",
             "sky",
             "pipeline",
-            "lens",
             "track",
         ],
     ),
@@ -121,7 +109,6 @@ const ROOMS: &[(&str, &[&str])] = &[
             "identify",
             "sky",
             "pipeline",
-            "lens",
             "report",
         ],
     ),

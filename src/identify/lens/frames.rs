@@ -1,14 +1,14 @@
 //! The frames of a calibration.
 
-use super::formats::Pointing;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::camera::CameraModel;
+use crate::camera::formats::Pointing;
 use crate::catalog::StarIndex;
 use crate::ephemeris::observer::Observation;
 use crate::ephemeris::places::StarPlaces;
-use crate::identify::fit::JointFrame;
-use crate::pipeline::{Outcome, Reason, Solution};
+use crate::identify::fit::{JointFrame, MeasuredStar};
+use crate::identify::identification::Identification;
 use std::cmp::Ordering;
 
 /// A frame with its stars.
@@ -95,34 +95,38 @@ impl Unfit {
 }
 
 impl LensFrame {
-    /// The stars of a solved frame, which has this name.
-    ///
-    /// # Errors
-    /// [`Unfit::NotIdentified`].
-    pub fn new(name: &str, solution: &Solution) -> Result<Self, Unfit> {
-        let found = match &solution.outcome {
-            Outcome::Identified(found) => found,
-            Outcome::NotIdentified(reason) => {
-                let code = Reason::code(reason);
-                return Err(Unfit::NotIdentified { code });
-            }
-        };
-        let (names, stars): (Vec<_>, Vec<_>) = solution.named_stars(found).unzip();
+    /// The stars of an identified frame, which has this name.
+    pub(crate) fn new(
+        name: &str,
+        found: &Identification,
+        named: impl Iterator<Item = (StarIndex, MeasuredStar)>,
+    ) -> Self {
+        let (names, stars): (Vec<_>, Vec<_>) = named.unzip();
         let mut by_name: Vec<usize> = (0..names.len()).collect();
         by_name.sort_by_key(|star| names[*star]);
-        Ok(Self {
+        Self {
             name: name.to_owned(),
             names,
             by_name,
             camera: found.camera,
             places: found.places,
-            date: solution.date.map(|known| known.date),
-            observation: solution.observation,
+            date: None,
+            observation: None,
             joint: JointFrame {
                 stars,
                 icrs_to_camera: found.icrs_to_camera,
             },
-        })
+        }
+    }
+
+    /// The same, taken then and there.
+    pub(crate) fn taken(
+        mut self,
+        date: Option<ObservationDate>,
+        observation: Option<Observation>,
+    ) -> Self {
+        (self.date, self.observation) = (date, observation);
+        self
     }
 
     /// Number of its stars.

@@ -1,6 +1,6 @@
 //! Which lens does a camera have? It is measured in several of its frames at once.
 //!
-//! solved frames → [`LensFrame`] for each → [`calibrate()`] → [`LensCalibration`] with the
+//! solved frames → [`LensFrame`] for each ([`Solution::lens_frame`](crate::Solution::lens_frame)) → [`calibrate()`] → [`LensCalibration`] with the
 //! [`KnownLens`](crate::camera::KnownLens) that `camera.toml` holds
 //!
 //! 1. Frames of another size or focal length are left out, and copies of others: they are one observation.
@@ -20,7 +20,6 @@ mod copies;
 mod coverage;
 mod cross_validation;
 mod direction_scatter;
-pub mod formats;
 mod frames;
 mod mount;
 mod repeats;

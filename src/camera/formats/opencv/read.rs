@@ -31,11 +31,11 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// # Example
 /// ```
 /// use starpipe::CameraModel;
-/// use starpipe::lens::formats::{from_opencv_yaml, opencv_yaml};
+/// use starpipe::camera::formats::{from_opencv_yaml, opencv_yaml};
 ///
 /// let camera = CameraModel::pinhole(640.0, 480.0, 900.0, false);
 /// assert_eq!(from_opencv_yaml(&opencv_yaml(&camera)?)?.focal_length_px(), 900.0);
-/// # Ok::<(), starpipe::lens::formats::FormatError>(())
+/// # Ok::<(), starpipe::camera::formats::FormatError>(())
 /// ```
 pub fn from_opencv_yaml(text: &str) -> Result<CameraModel, FormatError> {
     from_opencv_yaml_within(text, TOLERANCE_PX)
