@@ -52,6 +52,7 @@
 //! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`sky`] | how bright is the sky, how clear, and how faint do stars go at each place |
+//! | [`centroids`] | what does a list of centroids hold |
 //! | [`pipeline`] | what does a frame show: the stages in order |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
@@ -78,6 +79,7 @@ pub mod base;
 pub mod calibration;
 pub mod camera;
 pub mod catalog;
+pub mod centroids;
 pub mod detect;
 pub mod ephemeris;
 pub mod frame;
@@ -102,6 +104,7 @@ pub use base::size::Size;
 pub use calibration::Calibration;
 pub use camera::CameraModel;
 pub use catalog::{Catalog, Star};
+pub use centroids::CentroidList;
 pub use detect::{DetectConfig, Detection, Detections, detect};
 pub use ephemeris::observer::Site;
 pub use frame::Frame;
@@ -110,7 +113,7 @@ pub use identify::{
 };
 pub use nalgebra;
 pub use pipeline::{
-    CentroidList, Context, Error, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
+    Context, Error, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
     solve_centroids, solve_file, solve_frame,
 };
 pub use report::{FrameReport, TextOptions};

@@ -3,11 +3,10 @@
 use serde_json::Value;
 use starpipe::base::coords::Rotation;
 use starpipe::camera::{self, data_sheet::Preset};
+use starpipe::centroids::{CentroidList, CentroidListOptions, ListedCentroid};
 use starpipe::identify::{DateSource, FrameDate, Photometry, Scale, ScaleSource};
 use starpipe::photometry::comparison::ObservingSetup;
-use starpipe::pipeline::{
-    CentroidList, CentroidListOptions, ListedCentroid, solve_centroids, solve_frame,
-};
+use starpipe::pipeline::{solve_centroids, solve_frame};
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
 use starpipe::{
     CameraModel, Context, Frame, FrameReport, IndexedCatalog, Interrupt, PixelPoint, ScalePrior,

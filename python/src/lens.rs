@@ -3,7 +3,7 @@
 use crate::errors::{detached, exception, json};
 use crate::solved::Solved;
 use pyo3::prelude::*;
-use starpipe::identify::lens::{self, LeftOutFrame, LensFrame};
+use starpipe::identify::lens::{self, LeftOutFrame};
 use starpipe::report::LensReport;
 
 /// The report of a calibration as the program's JSON, and the table `[lens]` of a description.

@@ -13,9 +13,8 @@ use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
 use starpipe::photometry::instrumental_mag;
-use starpipe::pipeline::{
-    self, CentroidList, ListedCentroid, solve_centroids, solve_frame, solve_guarded, solve_read,
-};
+use starpipe::centroids::{CentroidList, ListedCentroid};
+use starpipe::pipeline::{self, solve_centroids, solve_frame, solve_guarded, solve_read};
 use starpipe::{Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

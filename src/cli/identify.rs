@@ -7,7 +7,7 @@ use super::solving::options::SolvingOptions;
 use super::solving::{Inputs, Plan, report_all};
 use clap::Args;
 use starpipe::camera::data_sheet::CameraDescription;
-use starpipe::pipeline::CentroidListOptions;
+use starpipe::centroids::CentroidListOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -12,14 +12,14 @@
 //!    photons, coarse steps, a black level that cuts off half of the noise.
 //! 4. `candidates`: connected regions above the threshold, their peaks, and which of those are
 //!    sources of their own.
-//! 5. `psf_fit`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
+//! 5. `psf::measured`: where the stars are not round Gaussians of one size (motion, defocus, aberrations),
 //!    an effective PSF is measured on the bright ones, and tabulated (`field_tables`).
-//!    Where the stars are long trails, `trailed` measures these instead of steps 6 and 7.
+//!    Where the stars are long trails, `trails::stars` measures these instead of steps 6 and 7.
 //! 6. `fit`, `measure`: a fit of each source, together with those that it touches, or a
 //!    grey-weighted centroid; flags for non-stellar and truncated sources.
 //! 7. `wings`: light of the stars beyond the spots that are fitted, which is added to the fluxes.
 //!
-//! `trails` searches what is left for satellites, aeroplanes and meteors
+//! `trails::satellites` searches what is left for satellites, aeroplanes and meteors
 //! ([`Workspace::find_trails`]).
 //!
 //! `search` runs steps 2 to 4, up to three times, until the filter fits the stars that it finds.
@@ -51,13 +51,11 @@ mod flux_limits;
 mod measure;
 mod pixels;
 mod psf;
-mod psf_fit;
 mod search;
 mod sky_area;
 mod star_model;
 mod threads;
 mod threshold;
-mod trailed;
 mod trails;
 #[doc(hidden)]
 pub mod windows;
@@ -87,9 +85,9 @@ use measure::{MeasureBuffers, Measurement, Ring, StarShape, sharpest_px};
 use pixels::View;
 use psf::FieldTables;
 pub(crate) use psf::PIXEL_VARIANCE_PX2;
-use psf_fit::measure_psf;
+use psf::measured::measure_psf;
 use search::{FrameSearch, SearchInput, Searched};
-use trailed::{Trails, measure_trailed};
+use trails::{Trails, measure_trailed};
 use wings::measure_wings;
 
 /// Finds the stars of `frame`, and other sources, brightest first.

@@ -1,9 +1,9 @@
 //! Why the frame in a file could not be examined.
 
-use super::centroid_table::CentroidListError;
 use crate::base::panics::Panicked;
 use crate::base::remedy::Remedy;
 use crate::calibration::CalibrationError;
+use crate::centroids::CentroidListError;
 use crate::detect::DetectError;
 use crate::frame::FrameError;
 use std::path::PathBuf;

@@ -13,17 +13,11 @@
 mod bodies;
 mod body_in_frame;
 mod bright_stars;
-mod centroid_columns;
-mod centroid_list;
-mod centroid_table;
-mod centroid_text;
 mod coarse_frames;
 mod context;
 mod error;
 mod held;
 mod identification;
-mod left_out;
-mod list_frame;
 mod note;
 mod options;
 mod outcome;
@@ -41,10 +35,6 @@ mod stopwatch;
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
 #[doc(hidden)]
-pub use centroid_list::LISTED_SIGMA_PX;
-pub use centroid_list::{CentroidList, ListedCentroid};
-pub use centroid_table::{CentroidListError, CentroidListOptions};
-#[doc(hidden)]
 pub use context::DEFAULT_TIME_LIMIT_S;
 pub use context::{Context, Workspace};
 pub use error::Error;
@@ -52,7 +42,6 @@ pub use error::Error;
 pub use error::remedies_of;
 #[doc(hidden)]
 pub use held::HeldCamera;
-pub use left_out::{LeftOut, RowProblem};
 pub use note::Note;
 pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};

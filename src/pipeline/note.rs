@@ -2,8 +2,6 @@
 
 use super::body_in_frame::BodyInFrame;
 use super::bright_stars::MissingStar;
-use super::left_out::LeftOut;
-use super::list_frame::ListFrame;
 use super::outcome::Outcome;
 use super::place_time::PlaceTime;
 use super::raw_color::RawColor;
@@ -13,6 +11,8 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::calibration::ExposureMismatch;
 use crate::camera::KnownLens;
 use crate::catalog::Catalog;
+use crate::centroids::LeftOut;
+use crate::centroids::ListFrame;
 use crate::detect::{Circle, MeasuredPsf, NoiseTail, SkyArea, StarTrails, Trail, Wings};
 use crate::ephemeris::observer::Observation;
 use crate::ephemeris::solar_system::BodyKind;

@@ -1,17 +1,18 @@
 //! Identification of a list of centroids.
 
 use super::bodies::find_bodies;
-use super::centroid_list::CentroidList;
-use super::centroid_table::CentroidListError;
 use super::context::{Context, Workspace};
 use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
-use super::list_frame::ListFrame;
 use super::note::Note;
+use super::outcome::Outcome;
 use super::place_time::{Settled, settle};
 use super::solution::Solution;
 use super::source::Source;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::size::Size;
+use crate::centroids::CentroidList;
+use crate::centroids::CentroidListError;
+use crate::centroids::ListFrame;
 use crate::identify::{Priors, ScalePrior, ScaleSource};
 
 /// What is known of a list whose frame has this size.
@@ -41,7 +42,7 @@ fn priors_of(size: Size, context: &Context) -> Priors {
 /// # Example
 /// ```
 /// use starpipe::identify::Photometry;
-/// use starpipe::pipeline::ListedCentroid;
+/// use starpipe::centroids::ListedCentroid;
 /// use starpipe::{CameraModel, Catalog, CentroidList, Context, IndexedCatalog};
 /// use starpipe::{Rotation, UnitVector, Workspace, solve_centroids};
 ///
@@ -66,7 +67,7 @@ fn priors_of(size: Size, context: &Context) -> Priors {
 /// let solution = solve_centroids(&list, &Context::new(&indexed), &mut Workspace::new())?;
 /// let found = solution.outcome.identification().expect("the stars are identified");
 /// assert!(found.icrs_to_camera.angle_to(&attitude) < 1e-5);
-/// # Ok::<(), starpipe::pipeline::CentroidListError>(())
+/// # Ok::<(), starpipe::centroids::CentroidListError>(())
 /// ```
 pub fn solve_centroids(
     list: &CentroidList,
@@ -101,7 +102,9 @@ pub fn solve_centroids(
     let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
         list.star_field_in(frame.size, priors.places())
     });
-    frame.add_unknown_centre(&list, &mut outcome);
+    if let Outcome::Identified(found) = &mut outcome {
+        frame.add_unknown_centre(&list, found);
+    }
     let observation = observation(&outcome, priors);
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
     clock.lap(Stage::Identify);

@@ -1,6 +1,7 @@
 //! One source of a frame or of a list of centroids.
 
 use crate::base::coords::PixelPoint;
+use crate::centroids::ListedCentroid;
 use crate::detect::{Detection, DetectionFlags};
 
 /// One source: a detection, or a line of a centroid list.
@@ -40,6 +41,16 @@ impl From<&Detection> for Source {
                 flags: detection.flags,
             }),
             flux: Some(detection.flux_adu),
+        }
+    }
+}
+
+impl From<&ListedCentroid> for Source {
+    fn from(centroid: &ListedCentroid) -> Self {
+        Self {
+            position: centroid.position,
+            measured: None,
+            flux: centroid.flux,
         }
     }
 }

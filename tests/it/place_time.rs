@@ -5,9 +5,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use starpipe::camera::Projection;
+use starpipe::centroids::ListedCentroid;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{DateSource, DateZone, FrameDate, Photometry};
-use starpipe::pipeline::{Change, Contradiction, ListedCentroid, Note, PlaceTime};
+use starpipe::pipeline::{Change, Contradiction, Note, PlaceTime};
 use starpipe::{
     CameraModel, CentroidList, Context, ObservationDate, PixelPoint, Rotation, Site, Solution,
     UnitVector, UtcOffset, Workspace, solve_centroids,

@@ -4,7 +4,7 @@ use super::stdin::is_stdin;
 use anyhow::Context;
 use starpipe::CentroidList;
 use starpipe::base::files;
-use starpipe::pipeline::CentroidListOptions;
+use starpipe::centroids::CentroidListOptions;
 use std::io::{self, Read};
 use std::path::Path;
 

@@ -5,9 +5,9 @@ use crate::cli::exit::CommandError;
 use crate::cli::input::centroid_list;
 use anyhow::anyhow;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use starpipe::centroids::CentroidListOptions;
 use starpipe::identify::Photometry;
 use starpipe::model::simulate::{Scene, Setup};
-use starpipe::pipeline::CentroidListOptions;
 use std::path::Path;
 
 /// What the frames show.

@@ -4,10 +4,10 @@ use crate::cli::input::centroid_list;
 use crate::cli::input::frames::read_frame;
 use crate::cli::input::stdin::is_stdin;
 use anyhow::Context as _;
+use starpipe::centroids::CentroidListOptions;
 use starpipe::frame::{Buffers, Frame, FrameError, ImageName, PageChoice, Pages};
 use starpipe::pipeline::{
-    CentroidListOptions, Context, Error, Solution, Workspace, solve_centroids, solve_guarded,
-    solve_read,
+    Context, Error, Solution, Workspace, solve_centroids, solve_guarded, solve_read,
 };
 use std::path::Path;
 use std::{io, mem};

@@ -3,12 +3,13 @@
 //! `gaussian`: a round Gaussian integrated over the pixels, and sums of such. `effective`: the spot
 //! of a frame whose stars are not round, as it changes over the field; `table` and `field_tables`
 //! tabulate it, and `taps` finds the samples that a pixel takes. `lanes`: arithmetic of groups of
-//! pixels.
+//! pixels. `measured`: the PSF of a frame, measured on its bright stars.
 
 mod effective;
 mod field_tables;
 mod gaussian;
 mod lanes;
+pub(super) mod measured;
 mod table;
 mod taps;
 

@@ -3,12 +3,13 @@
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::CameraModel;
 use crate::catalog::{Catalog, StarIndex};
+use crate::centroids::CentroidListError;
 use crate::detect::DetectError;
 use crate::frame::{Frame, FrameError};
 use crate::identify::{Identification, StarMatch};
 use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
-use crate::pipeline::{CentroidListError, Context, Solution, Source, Workspace, solve_frame};
+use crate::pipeline::{Context, Solution, Source, Workspace, solve_frame};
 use crate::study::validation::LightMap;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};

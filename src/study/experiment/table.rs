@@ -5,10 +5,11 @@ use crate::base::coords::PixelPoint;
 use crate::base::format::to_decimals;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::catalog::{Catalog, StarId, StarIndex};
+use crate::centroids::{CentroidList, ListedCentroid};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{Identification, Photometry, SourceIndex};
 use crate::model::sensitivity::{Budget, Scenario};
-use crate::pipeline::{CentroidList, ListedCentroid, Solution};
+use crate::pipeline::Solution;
 use serde::Serialize;
 
 /// The result of the paper's table.

@@ -53,6 +53,17 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "centroids",
+        &[
+            "base",
+            "ephemeris",
+            "camera",
+            "detect",
+            "identify",
+            "photometry",
+        ],
+    ),
+    (
         "pipeline",
         &[
             "base",
@@ -66,6 +77,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "model",
             "photometry",
             "sky",
+            "centroids",
         ],
     ),
     (
@@ -127,6 +139,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "model",
             "photometry",
             "sky",
+            "centroids",
             "pipeline",
             "night",
         ],

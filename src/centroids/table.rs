@@ -1,8 +1,8 @@
 //! Lists of centroids as tables.
 
-use super::centroid_columns::{Brightness, Columns};
-use super::centroid_list::CentroidList;
-use super::centroid_text::ListText;
+use super::columns::{Brightness, Columns};
+use super::list::CentroidList;
+use super::text::ListText;
 use crate::base::coords::PixelPoint;
 use crate::base::files;
 use crate::base::format::{excerpt, table_name};
@@ -258,10 +258,10 @@ pub(super) fn check_inside(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::centroids::LeftOut;
+    use crate::centroids::frame::ListFrame;
     use crate::detect::DetectionFlags;
     use crate::ephemeris::places::StarPlaces;
-    use crate::pipeline::LeftOut;
-    use crate::pipeline::list_frame::ListFrame;
 
     fn parsed(text: &str) -> Result<CentroidList, CentroidListError> {
         CentroidList::parse(text.as_bytes(), &CentroidListOptions::default())

@@ -9,9 +9,8 @@
 //!
 //! A list may be of a part of its frame, which the gaps do not show: half of the lists are taken to be such.
 
-use super::centroid_list::CentroidList;
-use super::centroid_table::{CentroidListError, check_inside};
-use super::outcome::Outcome;
+use super::list::CentroidList;
+use super::table::{CentroidListError, check_inside};
 use crate::base::size::Size;
 use crate::camera::{DistortionModel, agreed_size};
 use crate::identify::fit::{JointFrame, MeasuredStar, fit_jointly, robust_sigma_px};
@@ -24,7 +23,7 @@ const USUAL_AXIS: f64 = 0.03;
 
 /// The size of the frame of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct ListFrame {
+pub(crate) struct ListFrame {
     pub size: Size,
     /// Whether its width and its height are guesses: as far as the centroids reach.
     pub is_guessed: [bool; 2],
@@ -45,10 +44,7 @@ impl ListFrame {
     }
 
     /// Adds to the errors of an identified frame of guessed size that its centre is not known.
-    pub fn add_unknown_centre(&self, list: &CentroidList, outcome: &mut Outcome) {
-        let Outcome::Identified(found) = outcome else {
-            return;
-        };
+    pub fn add_unknown_centre(&self, list: &CentroidList, found: &mut Identification) {
         if self.is_guessed == [false; 2] {
             return;
         }

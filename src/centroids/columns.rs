@@ -1,6 +1,6 @@
 //! The columns of lists of centroids, by the names that programs give them.
 
-use super::centroid_list::ListedCentroid;
+use super::list::ListedCentroid;
 use crate::base::coords::PixelPoint;
 use crate::base::format::excerpt;
 use crate::detect::DetectionFlags;

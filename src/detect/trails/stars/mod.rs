@@ -17,5 +17,5 @@ mod shape;
 mod tests;
 mod trails;
 
-pub(super) use measurement::measure_trailed;
-pub(super) use trails::Trails;
+pub(in crate::detect) use measurement::measure_trailed;
+pub(in crate::detect) use trails::Trails;

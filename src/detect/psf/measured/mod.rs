@@ -12,11 +12,13 @@ mod field;
 mod lobe_shares;
 mod stars;
 
-use super::candidates::Peak;
-use super::fit::{FitBuffers, FrameMaps, NoiseModel, SpotEstimate, Window};
-use super::psf::{EffectivePsf, FieldForm, FieldFrame, LocalPsf, MAX_WINDOW_PX, SpotMoments};
-use super::star_model::{StarModel, noise_of};
 use crate::base::statistics::median;
+use crate::detect::candidates::Peak;
+use crate::detect::fit::{FitBuffers, FrameMaps, NoiseModel, SpotEstimate, Window};
+use crate::detect::psf::{
+    EffectivePsf, FieldForm, FieldFrame, LocalPsf, MAX_WINDOW_PX, SpotMoments,
+};
+use crate::detect::star_model::{StarModel, noise_of};
 use field::moments_over_field;
 use lobe_shares::{LobeGrid, LobeSums};
 use stars::{PsfStar, STEPS, StarFitter};

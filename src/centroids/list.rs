@@ -1,7 +1,6 @@
 //! Lists of centroids.
 
 use super::left_out::{LeftOut, RowProblem};
-use super::source::Source;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::DetectionFlags;
@@ -63,7 +62,7 @@ impl ListedCentroid {
     }
 
     /// Standard error on one axis, stated or assumed, in pixels.
-    pub(super) fn error_px(&self) -> f64 {
+    pub(crate) fn error_px(&self) -> f64 {
         self.sigma_px.unwrap_or(LISTED_SIGMA_PX)
     }
 
@@ -122,7 +121,7 @@ impl CentroidList {
     }
 
     /// The size of a frame with these sides, or as far as its centroids reach.
-    pub(super) fn reached_size(&self, stated: [Option<usize>; 2]) -> Size {
+    pub(crate) fn reached_size(&self, stated: [Option<usize>; 2]) -> Size {
         let [width, height] = [0, 1].map(|axis| {
             let reach = || (self.reach_px(axis)[1].round() as usize).saturating_add(1);
             stated[axis].unwrap_or_else(reach)
@@ -131,7 +130,7 @@ impl CentroidList {
     }
 
     /// The smallest and the largest coordinate of the centroids, from 0 on.
-    pub(super) fn reach_px(&self, axis: usize) -> [f64; 2] {
+    pub(crate) fn reach_px(&self, axis: usize) -> [f64; 2] {
         let places = self.centroids.iter().map(|centroid| {
             let place = centroid.position;
             [place.x, place.y][axis]
@@ -142,7 +141,7 @@ impl CentroidList {
     }
 
     /// The same in a frame of this size.
-    pub(super) fn star_field_in(&self, size: Size, places: StarPlaces) -> StarField {
+    pub(crate) fn star_field_in(&self, size: Size, places: StarPlaces) -> StarField {
         let observed = |(line, centroid): (usize, &ListedCentroid)| ObservedStar {
             source: SourceIndex::new(line),
             position: centroid.position,
@@ -182,14 +181,4 @@ fn without_coincident(centroids: &[ListedCentroid]) -> Vec<bool> {
         is_alone
     };
     centroids.iter().map(is_kept).collect()
-}
-
-impl From<&ListedCentroid> for Source {
-    fn from(centroid: &ListedCentroid) -> Self {
-        Self {
-            position: centroid.position,
-            measured: None,
-            flux: centroid.flux,
-        }
-    }
 }
