@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ._result import Result
     from ._tables import Columns
 
 Rings = Literal["named", "all", "none"]
@@ -32,8 +31,26 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+class Drawn(Protocol):
+    """What of a result is drawn."""
+
+    @property
+    def _name(self) -> str: ...
+
+    @property
+    def shape(self) -> tuple[int, int]: ...
+
+    @property
+    def star_columns(self) -> Columns: ...
+
+    @property
+    def _is_bottom_up(self) -> bool: ...
+
+    def __bool__(self) -> bool: ...
+
+
 def draw(
-    result: Result,
+    result: Drawn,
     picture: tuple[NDArray[np.uint8], tuple[int, int]] | None,
     ax: Axes | None,
     rings: Rings,
@@ -89,7 +106,7 @@ def _called(stars: Columns) -> NDArray[np.str_]:
     return np.array([called(*star) for star in zip(*columns, strict=True)], dtype=np.str_)
 
 
-def _mark(ax: Axes, result: Result, rings: Rings, names: int) -> None:
+def _mark(ax: Axes, result: Drawn, rings: Rings, names: int) -> None:
     from matplotlib.patheffects import withStroke
 
     stars = result.star_columns

@@ -1,6 +1,6 @@
 //! How a frame was taken, according to its file.
 
-use super::mosaic::BayerPattern;
+use super::bayer_pattern::BayerPattern;
 use super::orientation::Orientation;
 use super::row_order::RowOrder;
 use crate::base::epoch::ObservationDate;

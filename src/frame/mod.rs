@@ -29,6 +29,7 @@
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
 mod account;
+mod bayer_pattern;
 mod colors;
 mod columns;
 mod compressed;
@@ -59,6 +60,7 @@ mod saturation;
 mod tiff;
 mod turning;
 
+pub use bayer_pattern::BayerPattern;
 pub use colors::Colors;
 #[doc(hidden)]
 pub use columns::DefectiveColumn;
@@ -88,7 +90,7 @@ pub use memory::MemoryLimit;
 pub use metadata::{Assumption, FrameMetadata};
 #[doc(hidden)]
 pub use metadata::{IgnoredValue, ImageChoice};
-pub use mosaic::{BayerPattern, Mosaic};
+pub use mosaic::Mosaic;
 pub use orientation::Orientation;
 pub use other_file::OtherFile;
 #[doc(hidden)]

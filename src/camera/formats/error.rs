@@ -3,6 +3,9 @@
 use crate::base::format::excerpt;
 use crate::camera::ImplausibleLens;
 
+/// The largest error of a converted lens, in pixels, unless the caller allows more.
+pub const TOLERANCE_PX: f64 = 0.01;
+
 /// Why a lens cannot be written in a format, or a file is not a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

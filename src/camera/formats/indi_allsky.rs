@@ -10,7 +10,8 @@
 
 use super::error::FormatError;
 use super::fit::{grid, least_squares};
-use super::platepar::{Pointing, Sky};
+use super::pointing::Pointing;
+use super::sky::Sky;
 use crate::CameraModel;
 use crate::base::coords::{PixelPoint, Rotation};
 use crate::base::units::DEG_PER_RAD;

@@ -18,14 +18,14 @@ mod fit;
 mod indi_allsky;
 mod opencv;
 mod platepar;
+mod pointing;
 mod ros;
+mod sky;
 mod yaml;
 
-pub use error::FormatError;
+pub use error::{FormatError, TOLERANCE_PX};
 pub use indi_allsky::{IndiAllskyLens, indi_allsky, indi_allsky_json};
 pub use opencv::{from_opencv_yaml, from_opencv_yaml_within, opencv_yaml, opencv_yaml_within};
-pub use platepar::{Pointing, from_platepar, from_platepar_within, platepar};
+pub use platepar::{from_platepar, from_platepar_within, platepar};
+pub use pointing::Pointing;
 pub use ros::ros_camera_info;
-
-/// The largest error of a converted lens, in pixels, unless the caller allows more.
-pub const TOLERANCE_PX: f64 = 0.01;

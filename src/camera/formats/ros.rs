@@ -3,8 +3,8 @@
 //! # Reference
 //! ROS, `sensor_msgs/CameraInfo`.
 
-use super::TOLERANCE_PX;
 use super::error::FormatError;
+use super::error::TOLERANCE_PX;
 use super::opencv::cv_lens;
 use super::yaml::write_matrix;
 use crate::CameraModel;

@@ -6,9 +6,9 @@
 //! mosaic has the same filter twice, on a diagonal. Where more light passes there is more shot noise,
 //! as well.
 
-use super::pattern::{BayerPattern, Diagonal};
 use crate::base::statistics::median_and_sigma;
 use crate::frame::Frame;
+use crate::frame::bayer_pattern::{BayerPattern, Diagonal};
 
 /// Side of a patch, in pixels: 256 of each filter.
 const PATCH_PX: usize = 32;

@@ -18,13 +18,10 @@
 //! that near the highest.
 
 mod evidence;
-mod pattern;
 mod smoothing;
 
-pub use pattern::BayerPattern;
-
+use super::bayer_pattern::{BayerPattern, Diagonal};
 use super::image::Frame;
-use pattern::Diagonal;
 use serde::Serialize;
 
 /// The mosaic of filters over the pixels of a frame.

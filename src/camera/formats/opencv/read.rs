@@ -1,7 +1,7 @@
 //! YAML → [`CvLens`] → [`CameraModel`].
 
-use super::super::TOLERANCE_PX;
 use super::super::error::FormatError;
+use super::super::error::TOLERANCE_PX;
 use super::super::fit::{Guess, Sample, camera_like};
 use super::super::yaml::{Document, Matrix};
 use super::{CvLens, CvModel};

@@ -1,7 +1,7 @@
 //! [`CameraModel`] → [`CvLens`] → YAML.
 
-use super::super::TOLERANCE_PX;
 use super::super::error::FormatError;
+use super::super::error::TOLERANCE_PX;
 use super::super::fit::{
     CHECK_POINTS, FIT_POINTS, Sample, largest_error_px, least_squares, samples,
 };

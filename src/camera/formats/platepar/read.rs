@@ -1,11 +1,11 @@
 //! Platepar → ([`CameraModel`], [`Pointing`]).
 
-use super::super::TOLERANCE_PX;
 use super::super::error::FormatError;
+use super::super::error::TOLERANCE_PX;
 use super::super::fit::{Guess, Sample, camera_like, grid};
-use super::Pointing;
+use super::super::pointing::Pointing;
+use super::super::sky::Sky;
 use super::plate::{Kind, Left, Warp};
-use super::sky::Sky;
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;

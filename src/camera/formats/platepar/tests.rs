@@ -1,10 +1,13 @@
 use super::super::fit::samples;
-use super::super::{FormatError, TOLERANCE_PX};
+use super::super::sky::Sky;
+use super::super::{FormatError, Pointing, TOLERANCE_PX};
 use super::*;
 use crate::CameraModel;
+use crate::base::coords::{Icrs, Rotation};
 use crate::base::coords::{PixelPoint, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{Distortion, DistortionModel, Projection};
+use crate::ephemeris::observer::Site;
 
 /// Right ascension and declination in degrees.
 const STARS_DEG: [[f64; 2]; 5] = [
@@ -42,7 +45,7 @@ fn pixel_of(
     star: &UnitVector<Icrs>,
 ) -> PixelPoint {
     let json: serde_json::Value = serde_json::from_str(text).unwrap();
-    let sky = sky::Sky::new(
+    let sky = Sky::new(
         json["JD"].as_f64().unwrap(),
         pointing.site.lat_deg(),
         pointing.site.lon_deg(),

@@ -1,11 +1,11 @@
 //! [`CameraModel`] → platepar.
 
-use super::super::TOLERANCE_PX;
 use super::super::error::FormatError;
+use super::super::error::TOLERANCE_PX;
 use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, least_squares, samples};
-use super::Pointing;
+use super::super::pointing::Pointing;
+use super::super::sky::{Sky, sidereal_time_deg};
 use super::plate::{DEGREES, Kind, Warp};
-use super::sky::{Sky, sidereal_time_deg};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};

@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// The sky of a site at a date.
 #[derive(Debug, Clone)]
-pub(in super::super) struct Sky {
+pub(super) struct Sky {
     /// From the axes of J2000 to those of the date.
     pub(super) to_date: Matrix3<f64>,
     /// In the axes of the date.
@@ -26,12 +26,7 @@ pub(in super::super) struct Sky {
 }
 
 impl Sky {
-    pub(in super::super) fn new(
-        julian_date: f64,
-        lat_deg: f64,
-        lon_deg: f64,
-        is_refracted: bool,
-    ) -> Self {
+    pub(super) fn new(julian_date: f64, lat_deg: f64, lon_deg: f64, is_refracted: bool) -> Self {
         let turn_rad = (sidereal_time_deg(julian_date) + lon_deg) * RAD_PER_DEG;
         let zenith = UnitVector::from_ra_dec(turn_rad, lat_deg * RAD_PER_DEG);
         Self {
@@ -42,7 +37,7 @@ impl Sky {
     }
 
     /// From the axes of J2000 to those of the horizon: east, north, up.
-    pub(in super::super) fn to_horizon(&self) -> Matrix3<f64> {
+    pub(super) fn to_horizon(&self) -> Matrix3<f64> {
         let east = Vector3::z().cross(&self.zenith).normalize();
         let north = self.zenith.cross(&east);
         let rows = [east, north, self.zenith].map(|axis| axis.transpose());
