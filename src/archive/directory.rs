@@ -334,7 +334,6 @@ fn checksum_lines(frames: FileHash, stars: FileHash) -> String {
 }
 
 /// The file of the checksums of a part, by the contents of its tables.
-#[doc(hidden)]
 pub fn checksums(frames: &[u8], stars: &[u8]) -> String {
     checksum_lines(FileHash::of(frames), FileHash::of(stars))
 }

@@ -28,7 +28,6 @@ mod votable;
 mod write;
 
 pub use configuration::{CatalogIdentity, Configuration, FileHash, NightConfiguration};
-#[doc(hidden)]
 pub use directory::checksums;
 pub use directory::{Archive, PartState, PartWriter, claim_file};
 pub use error::ArchiveError;

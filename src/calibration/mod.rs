@@ -33,10 +33,7 @@ mod robust;
 
 pub use apply::{Applied, Calibration, ExposureMismatch, Master};
 pub use error::CalibrationError;
-#[doc(hidden)]
-pub use error::MAX_BAD_SHARE;
 pub use hot_pixels::{HotPixelList, read_hot_pixels};
-#[doc(hidden)]
 pub use pixel_stack::{OutOfMemory, PixelStack};
 
 #[cfg(test)]

@@ -24,7 +24,6 @@ pub use frame_size::FrameSizeError;
 pub(crate) use frame_size::agreed_size;
 pub use known_lens::KnownLens;
 pub use model::CameraModel;
-#[doc(hidden)]
 pub use model::focal_length_px;
 pub(crate) use model::frame_centre;
 pub use plausible::ImplausibleLens;

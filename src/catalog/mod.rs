@@ -64,15 +64,11 @@ mod table;
 mod tycho2;
 
 pub use error::CatalogError;
-#[doc(hidden)]
 pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
-#[doc(hidden)]
 pub use import::{ImportSummary, Reading, SourceFile};
 pub use numbers::StarNumbers;
-#[doc(hidden)]
 pub use read::read_until;
-#[doc(hidden)]
 pub use read::{import, read};
 pub use star::{Star, StarFlags, StarIndex};
 pub use star_catalog::Catalog;

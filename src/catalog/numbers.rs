@@ -128,7 +128,6 @@ impl StarNumbers {
     ///
     /// # Errors
     /// [`CompactError`] if it is not such a table.
-    #[doc(hidden)]
     pub fn give_table(bytes: Vec<u8>) -> Result<(), CompactError> {
         if TABLE.get().is_none() {
             let _ = TABLE.set(Numbers::open(bytes.leak())?);

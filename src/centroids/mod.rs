@@ -12,7 +12,5 @@ mod text;
 
 pub(crate) use frame::ListFrame;
 pub use left_out::{LeftOut, RowProblem};
-#[doc(hidden)]
-pub use list::LISTED_SIGMA_PX;
 pub use list::{CentroidList, ListedCentroid};
 pub use table::{CentroidListError, CentroidListOptions};

@@ -68,9 +68,7 @@ pub use detection::{
     Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, StarTrails, Wings,
 };
 pub use error::DetectError;
-#[doc(hidden)]
-pub use filter_model::FilterModel;
-#[doc(hidden)]
+pub(crate) use filter_model::FilterModel;
 pub use sky_area::Circle;
 pub use sky_area::SkyArea;
 pub use trails::Trail;

@@ -150,7 +150,6 @@ impl StarPlaces {
     }
 
     /// From apparent directions, in ICRS axes, to the axes of the site's horizon, if it is known.
-    #[doc(hidden)]
     pub fn horizon(&self) -> Option<Rotation<Icrs, Horizon>> {
         let Refraction { zenith, north, .. } = self.refraction.as_ref()?;
         let east = north.as_vector().cross(zenith.as_vector());

@@ -27,7 +27,6 @@ pub struct Colors {
 impl Colors {
     /// The colors of the pixels of `frame`, in their order; 65535 is full scale. `None` where they are not
     /// as many.
-    #[doc(hidden)]
     pub fn new(frame: &Frame, pixels: Vec<[u16; 3]>) -> Option<Self> {
         (pixels.len() == frame.size().pixels()).then(|| Self {
             step: f32::from(step_of(&pixels)),
@@ -45,7 +44,6 @@ impl Colors {
     }
 
     /// [`Self::read`] for the content of a file.
-    #[doc(hidden)]
     pub fn decode(bytes: &[u8], frame: &Frame, buffers: &mut Buffers) -> Option<Self> {
         let account = buffers.account(bytes.len()).ok()?;
         let (size, pixels) = no_panic(|| decode(bytes, &account)).ok()??;

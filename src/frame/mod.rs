@@ -62,11 +62,9 @@ mod turning;
 
 pub use bayer_pattern::BayerPattern;
 pub use colors::Colors;
-#[doc(hidden)]
 pub use columns::DefectiveColumn;
 #[cfg(feature = "overlay")]
 pub(crate) use directory::OVERLAY_TEXT;
-#[doc(hidden)]
 pub use directory::{
     CALIBRATION_CREATOR, COPY_CREATOR, TABLE_CREATOR, files_in, is_calibration_frame, is_copy,
     is_overlay, is_table,
@@ -74,30 +72,23 @@ pub use directory::{
 pub use error::FrameError;
 pub(crate) use fits::{BLOCK_BYTES, write_rows};
 pub use fits::{FitsHeader, FitsSamples, FitsWriteError, write_fits};
-#[doc(hidden)]
 pub use folder::{Cameras, Folder, PassedOver};
 pub use format::FrameFormat;
 pub use image::Frame;
-#[doc(hidden)]
 pub use image::check_size;
 #[cfg(feature = "overlay")]
 pub(crate) use levels::luminance;
-#[doc(hidden)]
 pub use levels::{LUMINANCE_WEIGHTS, WholeNumber};
-#[doc(hidden)]
 pub use limits::{MAX_PAGES, MAX_PIXELS, MIN_SIDE_PX};
 pub use memory::MemoryLimit;
 pub use metadata::{Assumption, FrameMetadata};
-#[doc(hidden)]
 pub use metadata::{IgnoredValue, ImageChoice};
 pub use mosaic::Mosaic;
 pub use orientation::Orientation;
 pub use other_file::OtherFile;
-#[doc(hidden)]
 pub use pages::{ImageName, PageChoice, Pages};
 pub use pixels::Pixels;
 pub use reader::{Buffers, decode, read};
-#[doc(hidden)]
 pub use reader::{decode_page, decode_page_with, read_page, read_page_with, read_stream};
 pub use row_order::RowOrder;
 pub(crate) use saturation::SaturationFinder;

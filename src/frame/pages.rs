@@ -95,7 +95,6 @@ impl Pages {
     }
 
     /// How many images can be found.
-    #[doc(hidden)]
     pub const fn count(&self) -> usize {
         self.count
     }

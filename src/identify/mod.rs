@@ -41,20 +41,15 @@ mod workspace;
 pub use effort::Effort;
 pub(crate) use field::CoarserFields;
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
-#[doc(hidden)]
 pub use identification::MIN_STARS;
 pub(crate) use identification::UnknownCentre;
 pub use identification::{Identification, SearchFailure, StarMatch};
 pub use index::IndexedCatalog;
-#[doc(hidden)]
 pub use index::{CacheError, cache_directory};
-#[doc(hidden)]
 pub use predict::{PredictedStar, SkyView};
 pub use priors::{
     DateSource, DateZone, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
 };
-#[doc(hidden)]
-pub use search::LOG10_FALSE_ALARM_LIMIT;
-#[doc(hidden)]
+pub(crate) use search::LOG10_FALSE_ALARM_LIMIT;
 pub use workspace::{NAME_ODDS, Pointing};
 pub use workspace::{Workspace, identify};

@@ -7,8 +7,7 @@ use std::borrow::Cow;
 
 /// The colors of a picture.
 #[derive(Debug)]
-#[doc(hidden)]
-pub enum PictureColors<'a> {
+pub(crate) enum PictureColors<'a> {
     /// A raw frame, whose pixels lie under a mosaic.
     Raw(ColorFrame<'a>),
     /// Red and blue of a picture that has all colors in each pixel.
@@ -56,8 +55,7 @@ impl PictureColors<'_> {
 
 /// A raw frame of a color camera.
 #[derive(Debug, Clone, Copy)]
-#[doc(hidden)]
-pub struct ColorFrame<'a> {
+pub(crate) struct ColorFrame<'a> {
     /// The filters over its pixels.
     pub mosaic: Mosaic,
     /// The frame before the mosaic is smoothed.

@@ -28,8 +28,7 @@ use crate::base::statistics::{LnProduct, normal_cdf, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
 /// Centre of the prior of the width, in magnitudes.
-#[doc(hidden)]
-pub const TYPICAL_WIDTH_MAG: f64 = 0.3;
+pub(crate) const TYPICAL_WIDTH_MAG: f64 = 0.3;
 /// Standard deviation of the prior of ln w.
 const LN_WIDTH_SIGMA: f64 = 1.0;
 /// The prior of λ: stars lost and stars kept.
@@ -40,13 +39,11 @@ const MIN_PER_SIDE: usize = 4;
 /// Largest standard error of a limit, in magnitudes.
 const MAX_SIGMA_MAG: f64 = 0.5;
 /// Width of a bin of the curve, in magnitudes.
-#[doc(hidden)]
-pub const BIN_MAG: f64 = 0.5;
+pub(crate) const BIN_MAG: f64 = 0.5;
 
 /// A catalogue star that counts in the completeness.
-#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CountedStar {
+pub(crate) struct CountedStar {
     /// V magnitude.
     pub v_mag: f64,
     /// Whether it was detected.
@@ -152,8 +149,7 @@ pub enum NoLimit {
 
 /// Measures the completeness of `stars`, in any order. `chance` is c, the probability that an
 /// undetected star has an unrelated detection at its position.
-#[doc(hidden)]
-pub fn measure(stars: &[CountedStar], chance: f64) -> Completeness {
+pub(crate) fn measure(stars: &[CountedStar], chance: f64) -> Completeness {
     let mut stars = stars.to_vec();
     stars.sort_unstable_by(|a, b| {
         let order = a.v_mag.total_cmp(&b.v_mag);

@@ -31,7 +31,6 @@ impl Measured {
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.
-#[doc(hidden)]
-pub fn instrumental_mag(flux: f64) -> f64 {
+pub(crate) fn instrumental_mag(flux: f64) -> f64 {
     -2.5 * libm::log10(flux)
 }

@@ -26,12 +26,9 @@ mod standards;
 pub mod zero_point;
 
 pub(crate) use association::{filter_response, resolved_px};
-#[doc(hidden)]
-pub use color_frame::{ColorFrame, PictureColors};
-#[doc(hidden)]
-pub use identified_frame::IdentifiedFrame;
-#[doc(hidden)]
-pub use measured::instrumental_mag;
+pub(crate) use color_frame::{ColorFrame, PictureColors};
+pub(crate) use identified_frame::IdentifiedFrame;
+pub(crate) use measured::instrumental_mag;
 
 use crate::base::statistics::median;
 use crate::catalog::StarIndex;
@@ -44,8 +41,7 @@ use standards::Standards;
 use zero_point::{NoZeroPoint, ZeroPoint};
 
 /// B−V of a star like the Sun, for which limits hold.
-#[doc(hidden)]
-pub const SUN_BV_MAG: f64 = 0.64;
+pub(crate) const SUN_BV_MAG: f64 = 0.64;
 
 /// Photometry of a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,8 +59,7 @@ pub struct FramePhotometry {
 }
 
 /// Measures zero point and completeness of `frame` with the stars of `sky`.
-#[doc(hidden)]
-pub fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry {
+pub(crate) fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry {
     let view = SkyView {
         camera: &frame.identification.camera,
         icrs_to_camera: &frame.identification.icrs_to_camera,

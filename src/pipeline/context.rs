@@ -37,12 +37,10 @@ pub struct Context<'a> {
     /// The lens with which they were taken, where it was measured.
     pub lens: Option<Arc<KnownLens>>,
     /// The sizes of the camera's frames, besides those of `camera` and `lens`.
-    #[doc(hidden)]
     pub frame_sizes: Vec<Size>,
     /// What local times in names of files and in Exif are ahead of UTC, where it is known.
     pub utc_offset: Option<UtcOffset>,
     /// How the camera stands, where it does not move: tried first.
-    #[doc(hidden)]
     pub held: Option<Arc<HeldCamera>>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
@@ -52,7 +50,6 @@ pub struct Context<'a> {
     /// Whether to measure the sky at each place.
     pub measure_sky: bool,
     /// Whether to do so without being asked in wide fields whose site and time are known.
-    #[doc(hidden)]
     pub measure_known_sky: bool,
     /// Whether to search satellites, aeroplanes and meteors.
     pub find_trails: bool,
@@ -69,7 +66,6 @@ pub struct Context<'a> {
     /// How long a frame may take, from where its reading begins.
     pub time_limit: Option<Duration>,
     /// Told of each stage that is done; a stage may come again.
-    #[doc(hidden)]
     pub on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
 }
 

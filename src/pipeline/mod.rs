@@ -34,13 +34,10 @@ mod stopwatch;
 
 pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
-#[doc(hidden)]
 pub use context::DEFAULT_TIME_LIMIT_S;
 pub use context::{Context, Workspace};
 pub use error::Error;
-#[doc(hidden)]
 pub use error::remedies_of;
-#[doc(hidden)]
 pub use held::HeldCamera;
 pub use note::Note;
 pub use options::SolveOptions;
@@ -49,11 +46,9 @@ pub use place_time::{Change, Contradiction, PlaceTime, Proposal};
 pub use raw_color::RawColor;
 pub use solution::{Background, Solution};
 pub use solve::{solve_file, solve_frame};
-#[doc(hidden)]
 pub use solve::{solve_guarded, solve_read};
 pub use solve_list::solve_centroids;
 pub use source::{Measured, Source};
 pub use star_field::star_field;
-#[doc(hidden)]
 pub use stopwatch::Stage;
 pub use stopwatch::Timing;

@@ -221,7 +221,6 @@ impl LensReport {
     }
 
     /// What is said of the lens, each with its name.
-    #[doc(hidden)]
     pub fn lines(&self) -> Vec<(&'static str, String)> {
         let lens = &self.lens;
         let mirrored = if lens.mirrored { ", mirrored" } else { "" };

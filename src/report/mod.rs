@@ -38,7 +38,6 @@ mod track;
 mod trails;
 pub mod wcs;
 
-#[doc(hidden)]
 pub use frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
     CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,
@@ -47,15 +46,9 @@ pub use frame_report::{
 };
 pub use frame_report::{FrameReport, SCHEMA};
 pub use lens::LensReport;
-#[doc(hidden)]
 pub use sky::{SkyCellReport, SkyReport, ZenithReport};
-#[doc(hidden)]
 pub use star_row::{StarRow, write_table_header};
-#[doc(hidden)]
 pub use stars::detections;
-#[doc(hidden)]
-pub use text::STARS_SHOWN;
 pub use text::TextOptions;
 pub use track::TrackReport;
-#[doc(hidden)]
 pub use track::{AxesReport, NotTrackedReport, TrackOpticsReport, TrackTimingReport};

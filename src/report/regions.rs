@@ -11,7 +11,6 @@ use crate::base::coords::PixelPoint;
 use std::fmt::Write;
 
 /// The first line, by which DS9 knows the format.
-#[doc(hidden)]
 pub const FIRST_LINE: &str = "# Region file format: DS9 version 4.1";
 
 /// The detections of a frame: circles with names are identified, boxes are not, points with a cross are

@@ -85,7 +85,6 @@ impl FrameReport {
     ///
     /// # Errors
     /// None for reports that [`new`](Self::new) made.
-    #[doc(hidden)]
     pub fn to_csv(&self, with_header: bool) -> io::Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         if with_header {

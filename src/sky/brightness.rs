@@ -21,8 +21,7 @@ const METER_DEG: f64 = 20.0;
 const METER_REACH_DEG: f64 = 30.0;
 /// The light of the zenith is that of the sky farther than this from the Moon, in degrees: a meter would
 /// measure the Moon, and a camera is saturated around it.
-#[doc(hidden)]
-pub const MOON_REACH_DEG: f64 = 10.0;
+pub(crate) const MOON_REACH_DEG: f64 = 10.0;
 /// Largest side of the cells in which the background is measured, in pixels: larger ones smooth clouds away.
 const MOST_MESH_PX: f64 = 64.0;
 

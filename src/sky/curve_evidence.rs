@@ -2,7 +2,6 @@
 
 /// What frames of one camera tell of its curve: the logarithm of the likelihood of each that a picture may have.
 #[derive(Debug, Clone, PartialEq)]
-#[doc(hidden)]
 pub struct CurveEvidence(pub(super) Vec<f64>);
 
 impl CurveEvidence {

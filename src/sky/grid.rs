@@ -51,8 +51,7 @@ struct Horizon {
 }
 
 /// Whether a field is divided by altitude, where the horizon is known.
-#[doc(hidden)]
-pub fn is_wide(camera: &CameraModel) -> bool {
+pub(crate) fn is_wide(camera: &CameraModel) -> bool {
     camera.radius_rad() > WIDE_RAD
 }
 

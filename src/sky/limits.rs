@@ -16,7 +16,6 @@ pub(super) struct CellLimits {
 }
 
 /// The limit at the centre of a frame with the threshold that is typical of it, by the camera's description.
-#[doc(hidden)]
 #[derive(Debug, Clone, Copy)]
 pub struct StatedLimit {
     /// V magnitude.

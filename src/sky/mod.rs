@@ -37,21 +37,16 @@ mod stars;
 mod tone_curve;
 mod witnesses;
 
-#[doc(hidden)]
-pub use brightness::MOON_REACH_DEG;
+pub(crate) use brightness::MOON_REACH_DEG;
 pub use brightness::{NoBrightness, SkyLight, ZenithSky};
 pub use clear_sky::ClearSky;
 pub use clouds::CLEAR_MAG;
-#[doc(hidden)]
 pub use curve_evidence::CurveEvidence;
 pub use dark_level::{DarkLevel, DarkSource};
 pub use grid::Place;
-#[doc(hidden)]
-pub use grid::{horizon_places, is_wide};
-#[doc(hidden)]
+pub(crate) use grid::{horizon_places, is_wide};
 pub use limits::StatedLimit;
-#[doc(hidden)]
-pub use picture::Picture;
+pub(crate) use picture::Picture;
 pub use tone_curve::{CurveKind, ToneFit};
 
 use crate::base::statistics::Estimate;
@@ -76,7 +71,6 @@ pub struct SkyMap {
     /// The tone curve, where gray levels may have one.
     pub tone_curve: Option<ToneFit>,
     /// What stars tell of it.
-    #[doc(hidden)]
     pub curve_evidence: Option<CurveEvidence>,
     /// Why no brightness was measured.
     pub no_brightness: Option<NoBrightness>,
@@ -107,7 +101,6 @@ pub struct SkyCell {
     /// The same if clouds are smooth, and if they are broken: the clouds' texture decides in between.
     pub clear_band: Option<[f64; 2]>,
     /// Flux at which half of the stars are detected, in ADU, without what the lens is known to take.
-    #[doc(hidden)]
     pub threshold_adu: f64,
     /// V magnitude at which half of the stars should be detected, without clouds.
     pub expected_limit_vmag: Option<f64>,
@@ -117,8 +110,7 @@ pub struct SkyCell {
 
 /// Measures the sky over `frame`; `None` where too few stars tell the zero point. If it is known from another
 /// frame of the camera, `usual` is the clear sky of that.
-#[doc(hidden)]
-pub fn measure(
+pub(crate) fn measure(
     frame: &IdentifiedFrame,
     picture: &Picture,
     catalog: &IndexedCatalog,

@@ -7,8 +7,7 @@ use crate::frame::Frame;
 use crate::photometry::PictureColors;
 
 /// A frame's pixels, and what is known of their light.
-#[doc(hidden)]
-pub struct Picture<'a, 'p> {
+pub(crate) struct Picture<'a, 'p> {
     /// The calibrated frame, without a mosaic.
     pub frame: &'a Frame<'a>,
     /// What fluxes were multiplied with: levels are as well.

@@ -29,6 +29,5 @@ mod pose;
 mod tracker;
 
 pub use outcome::{AngularRate, Attitude, Loss, Mode, Track, TrackedStar};
-#[doc(hidden)]
 pub use tracker::DEFAULT_STARS;
 pub use tracker::Tracker;

@@ -25,14 +25,12 @@ impl DarksReport {
     }
 
     /// What is not known, and why.
-    #[doc(hidden)]
     pub fn missing_texts(&self) -> impl Iterator<Item = String> {
         let missing = self.missing.iter();
         missing.map(|(what, reason)| format!("{}: {reason}", what.replace('_', " ")))
     }
 
     /// What was measured, each with its name.
-    #[doc(hidden)]
     pub fn lines(&self) -> Vec<(String, String)> {
         let mut lines = Vec::new();
         let mut line = |label: &str, value: String| lines.push((label.to_owned(), value));

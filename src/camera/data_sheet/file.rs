@@ -79,7 +79,6 @@ impl CameraDescription {
     ///
     /// # Errors
     /// As [`Self::read`].
-    #[doc(hidden)]
     pub fn parse(path: &Path, text: &str) -> Result<Self, DataSheetError> {
         let lens = lens_table::parse(path, text)?.map(Arc::new);
         let file = SheetFile::parse(path, text)?;

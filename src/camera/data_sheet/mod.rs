@@ -26,21 +26,15 @@ mod template;
 
 pub use error::DataSheetError;
 pub use file::CameraDescription;
-#[doc(hidden)]
 pub use imperfections::lens_transmission;
 pub use imperfections::{Imperfections, SpotForm};
 pub(crate) use key::key;
-#[doc(hidden)]
 pub use key::{Key, Limits, nearest_name};
-#[doc(hidden)]
 pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 pub use preset::Preset;
 pub use response::Response;
-#[doc(hidden)]
 pub use response::ResponseError;
 pub use sheet::DataSheet;
 pub use spot_image::SpotImage;
-#[doc(hidden)]
 pub use spot_image::SpotImageError;
-#[doc(hidden)]
 pub use template::template;

@@ -28,7 +28,6 @@ mod planets;
 mod rough;
 mod terrestrial_time;
 
-#[doc(hidden)]
 pub use body::TimeError;
 pub use body::{Body, BodyKind};
 
@@ -51,15 +50,13 @@ use nalgebra::Vector3;
 /// assert!(apart_rad.to_degrees() < 0.12); // The great conjunction.
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[doc(hidden)]
 pub fn bodies_at(date: &ObservationDate, error: TimeError, site: Option<Site>) -> [Body; 8] {
     let time = Time::new(date, error, site);
     BodyKind::ALL.map(|kind| time.body(kind))
 }
 
 /// Those of [`bodies_at`] that are within `radius_rad` of a direction. Faster where few are.
-#[doc(hidden)]
-pub fn bodies_within(
+pub(crate) fn bodies_within(
     date: &ObservationDate,
     error: TimeError,
     site: Option<Site>,
@@ -79,8 +76,7 @@ pub fn bodies_within(
 
 /// The Moon as seen from `site` at `date`, and the Sun's astrometric direction from the Earth's centre, to
 /// some 2′. In microseconds.
-#[doc(hidden)]
-pub fn moon_and_sun(date: &ObservationDate, site: Option<Site>) -> (Body, UnitVector<Icrs>) {
+pub(crate) fn moon_and_sun(date: &ObservationDate, site: Option<Site>) -> (Body, UnitVector<Icrs>) {
     let time = Time::new(date, TimeError::None, site);
     let sun = UnitVector::from_vector(-time.moment.earth_au);
     (time.body(BodyKind::Moon), sun)

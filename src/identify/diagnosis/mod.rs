@@ -19,12 +19,9 @@ mod levels;
 mod repeats;
 mod trails;
 
-#[doc(hidden)]
 pub use cause::DoubleImage;
 pub use cause::{Diagnosis, Excluded};
-#[doc(hidden)]
-pub use doubles::find_unnamed as find_double_image;
-#[doc(hidden)]
+pub(crate) use doubles::find_unnamed as find_double_image;
 pub use repeats::{RepeatedSky, find as find_repeated_sky};
 
 use crate::camera::focal_length_px;
@@ -36,8 +33,7 @@ use crate::identify::{IndexedCatalog, StarField, identify};
 
 /// A star field that was not identified.
 #[derive(Debug, Clone, Copy)]
-#[doc(hidden)]
-pub struct Unidentified<'a> {
+pub(crate) struct Unidentified<'a> {
     /// The frame and its detections. A list of centroids has neither.
     pub image: Option<(&'a Frame<'a>, &'a Detections)>,
     /// The observed stars.
@@ -49,8 +45,7 @@ pub struct Unidentified<'a> {
 }
 
 /// The cause why the stars were not identified; `None` where the search's own failure says it best.
-#[doc(hidden)]
-pub fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
+pub(crate) fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
     if case.failure == SearchFailure::Interrupted {
         return None;
     }

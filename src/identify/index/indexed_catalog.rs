@@ -120,7 +120,6 @@ impl<'a> IndexedCatalog<'a> {
     ///
     /// # Errors
     /// [`CacheError::Damaged`] if the bytes are not the index of this catalog.
-    #[doc(hidden)]
     pub fn with_index_bytes(catalog: &'a Catalog, bytes: Vec<u8>) -> Result<Self, CacheError> {
         let (classes, file) = cache::from_bytes(bytes, catalog.checksum())?;
         Ok(Self::with_index(
@@ -130,7 +129,6 @@ impl<'a> IndexedCatalog<'a> {
     }
 
     /// The index as the file in a cache directory has it, for programs that keep it elsewhere.
-    #[doc(hidden)]
     pub fn index_bytes(&self) -> Vec<u8> {
         for class in 0..self.triangles.classes.len() {
             for chunk in 0..CHUNKS {
@@ -141,7 +139,6 @@ impl<'a> IndexedCatalog<'a> {
     }
 
     /// The name of the index of `catalog`: it changes with the catalog and with the format.
-    #[doc(hidden)]
     pub fn index_name(catalog: &Catalog) -> String {
         cache::index_name(catalog.checksum())
     }

@@ -25,7 +25,6 @@ mod mount;
 mod repeats;
 mod scale_drift;
 
-#[doc(hidden)]
 pub use calibrate::MEASURED_BY;
 pub use calibrate::{CalibrateError, LensCalibration, UsedFrame, calibrate};
 pub use coverage::{Coverage, CoverageCell};

@@ -40,28 +40,17 @@ mod text;
 
 pub use budget::{Band, Budget};
 pub use check::ScenarioError;
-#[doc(hidden)]
 pub use completeness::{Detector, Rule};
-#[doc(hidden)]
-pub use conditions::REFERENCE_NM;
+pub(crate) use conditions::REFERENCE_NM;
 pub use conditions::{Conditions, Extinction, SkyBrightness};
-#[doc(hidden)]
 pub use cramer_rao::CramerRao;
 pub use faintest::Faintest;
-#[doc(hidden)]
 pub use figures::Figure;
-#[doc(hidden)]
-pub use light::temperature_k_of;
-#[doc(hidden)]
 pub use parameters::{CONDITION_KEYS, Parameter, UnknownParameter, title_of};
 pub use prediction::{CompletenessPoint, DetectorReport, Prediction};
 pub use rows::PredictionError;
-#[doc(hidden)]
 pub use rows::{PredictionRow, PredictionTableRow, SweptValue};
 pub use scenario::{Reading, Scenario};
-#[doc(hidden)]
 pub use star_light::StarLight;
-#[doc(hidden)]
 pub use sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
-#[doc(hidden)]
 pub use text::BudgetRow;

@@ -134,8 +134,7 @@ impl Prediction {
     ///
     /// # Errors
     /// As [`Self::new`].
-    #[doc(hidden)]
-    pub fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
+    pub(crate) fn with_detector(scenario: &Scenario) -> Result<(Self, Detector), ScenarioError> {
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
         let peak_pixel = Detector::new(Rule::PeakPixel, scenario, &budget);

@@ -46,21 +46,14 @@ mod truth;
 mod truth_table;
 
 pub use camera::Pointing;
-#[doc(hidden)]
 pub use camera::camera_of;
 pub(crate) use color_camera::{color, decoded_jpeg, demosaiced};
-#[doc(hidden)]
-pub use scene::SCENE_KEYS;
 pub use scene::Scene;
 pub use setup::Setup;
-#[doc(hidden)]
 pub use setup::SetupParameter;
 pub use simulator::Simulator;
-#[doc(hidden)]
 pub use simulator::star_field;
 pub use strays::{CosmicRay, Trail};
-#[doc(hidden)]
-pub use true_sky::TrueSky;
+pub(crate) use true_sky::TrueSky;
 pub use truth::{TrueStar, Truth};
-#[doc(hidden)]
 pub use truth_table::{TruthRow, truth_table};

@@ -141,7 +141,6 @@ impl<'a> Simulator<'a> {
     }
 
     /// Electrons of its stars.
-    #[doc(hidden)]
     pub fn light(&self) -> &StarLight {
         &self.light
     }
@@ -161,8 +160,7 @@ impl<'a> Simulator<'a> {
     }
 
     /// The true sky of the frame at a `pointing` with this `seed`.
-    #[doc(hidden)]
-    pub fn true_sky(&self, pointing: &Pointing, seed: u64) -> TrueSky<'_> {
+    pub(crate) fn true_sky(&self, pointing: &Pointing, seed: u64) -> TrueSky<'_> {
         let mut random = random(seed, FrameStream::Scene);
         // As for a frame: what is drawn before the clouds.
         self.scene.angular_rate_rad_s(&mut random);

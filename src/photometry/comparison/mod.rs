@@ -20,8 +20,7 @@ mod measurement;
 
 pub use contradiction::Contradiction;
 pub use measurement::ObservingSetup;
-#[doc(hidden)]
-pub use measurement::{FieldPlace, FieldStar, FrameMeasurement};
+pub(crate) use measurement::{FieldPlace, FieldStar, FrameMeasurement};
 
 use super::SUN_BV_MAG;
 use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
@@ -74,8 +73,7 @@ pub struct Comparison {
 const NO_SKY_MAG: f64 = 35.0;
 
 /// Compares a frame with the prediction for the stated camera; `None` if the exposure is unknown.
-#[doc(hidden)]
-pub fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comparison> {
+pub(crate) fn compare(stated: &ObservingSetup, frame: &FrameMeasurement) -> Option<Comparison> {
     let exposure_s = frame.exposure_s?;
     let transmissions = transmissions(frame);
     let typical = median(&mut transmissions.clone());
@@ -224,8 +222,7 @@ fn transmissions(frame: &FrameMeasurement) -> Vec<f64> {
 /// Predicted V magnitude of a star that gives 1 ADU/s, by the same fit as the measured one: `colors`
 /// and weights are those of the stars of the zero point, and `has_color_term` is whether it holds
 /// for [`REFERENCE_BV_MAG`] instead of for their mean.
-#[doc(hidden)]
-pub fn expected_zero_point_vmag(
+pub(crate) fn expected_zero_point_vmag(
     scenario: &Scenario,
     colors: &[WeightedColor],
     has_color_term: bool,
@@ -239,8 +236,7 @@ pub fn expected_zero_point_vmag(
 /// By how much fainter stars are as bright as one of the scenario's temperature, according to the
 /// fit of the zero point: at a color on the line through the colors of its stars, or on their
 /// average.
-#[doc(hidden)]
-pub fn fitted_color_effect_mag(
+pub(crate) fn fitted_color_effect_mag(
     light: &StarLight,
     colors: &[WeightedColor],
     at_bv_mag: Option<f64>,

@@ -27,7 +27,6 @@ mod standard;
 mod weights;
 
 pub(crate) use color_index::ColorIndex;
-#[doc(hidden)]
 pub use standard::{MIN_STARS, REFERENCE_BV_MAG, StandardStar, WeightedColor};
 pub use standard::{NoZeroPoint, ZeroPoint};
 
@@ -37,8 +36,7 @@ use relation::{Relation, Term};
 const MIN_COLORED_SHARE: f64 = 0.5;
 
 /// Measures the zero point of `stars`; `None` if they are too few.
-#[doc(hidden)]
-pub fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
+pub(crate) fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
     if stars.len() < MIN_STARS {
         return None;
     }

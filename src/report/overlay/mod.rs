@@ -34,9 +34,7 @@ mod sky;
 mod svg;
 mod trails;
 
-#[doc(hidden)]
 pub use letters::FONT;
-#[doc(hidden)]
 pub use svg::is_overlay as is_svg;
 
 use crate::catalog::Catalog;
@@ -76,7 +74,6 @@ pub fn encoded(
 }
 
 /// Draws a frame with its detections.
-#[doc(hidden)]
 pub fn draw(
     shown: &Shown<'_>,
     solution: &Solution,
@@ -119,7 +116,6 @@ fn drawing(
 }
 
 /// A frame without marks, at the size of its overlay. [`Stretch::Hard`] needs the noise of its background.
-#[doc(hidden)]
 pub fn photograph(
     shown: &Shown<'_>,
     background: Option<&Background>,

@@ -40,7 +40,6 @@ pub fn html(
 
 /// What a page with views of its own shows of a frame: elements, and the data of `showFrame` in `frame.js`,
 /// which brings them to life.
-#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrameView {
     /// The answer, the picture and the table, as elements.
@@ -53,7 +52,6 @@ pub struct FrameView {
 ///
 /// # Errors
 /// As [`html`].
-#[doc(hidden)]
 pub fn view(
     report: &FrameReport,
     solution: &Solution,
@@ -73,7 +71,6 @@ pub fn view(
 ///
 /// # Errors
 /// As [`html`].
-#[doc(hidden)]
 pub fn preview(frame: &Frame<'_>, most_px: usize) -> io::Result<Vec<u8>> {
     jpeg(&thumbnail(frame, most_px))
 }

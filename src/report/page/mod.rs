@@ -18,18 +18,14 @@ mod frame;
 mod table;
 mod template;
 
-#[doc(hidden)]
 pub use document::{Fact, Page, PageFigure, Thumbnail};
 pub use frame::html;
-#[doc(hidden)]
 pub use frame::{FrameView, preview, view};
-#[doc(hidden)]
 pub use table::PageTable;
 
 use memchr::memmem;
 
 /// Whether the file that begins with `head` is a page written by starpipe.
-#[doc(hidden)]
 pub fn is_page(head: &[u8]) -> bool {
     const GENERATOR: &[u8] = b"<meta name=\"generator\" content=\"starpipe\">";
     memmem::find(head, GENERATOR).is_some()

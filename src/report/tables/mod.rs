@@ -57,7 +57,6 @@ pub fn stars(report: &FrameReport, solution: &Solution, format: TableFormat) -> 
 }
 
 /// Whether the file that begins with `head` is a VOTable or ECSV written by starpipe.
-#[doc(hidden)]
 pub fn is_text_table(head: &[u8]) -> bool {
     [votable::MARK, ecsv::MARK]
         .iter()

@@ -124,13 +124,11 @@ fn cards(frame: &str, solution: &Solution, row_order: RowOrder) -> Option<FitsHe
 }
 
 /// Whether `file` is a header written by [`header`].
-#[doc(hidden)]
 pub fn is_header(file: &[u8]) -> bool {
     file.starts_with(b"SIMPLE  =") && memmem::find(file, SOLVED_BY.as_bytes()).is_some()
 }
 
 /// Adds the mapping from a file's pixels to the directions of the catalogue.
-#[doc(hidden)]
 pub fn add_projection(header: &mut FitsHeader, view: &SkyView, row_order: RowOrder) {
     let SkyView { camera, places, .. } = view;
     let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
