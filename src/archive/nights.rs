@@ -5,7 +5,7 @@ use super::error::ArchiveError;
 use super::frame_row::UNREAD;
 use super::read::{for_each_row, number, open, text};
 use crate::base::coords::{Icrs, UnitVector};
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use parquet::errors::ParquetError;
 use parquet::file::reader::ChunkReader;
@@ -147,17 +147,17 @@ impl Night {
         }
     }
 
-    fn finish(mut self) -> NightSummary {
-        let zero_point_vmag = median_of(&mut self.zero_points);
+    fn finish(self) -> NightSummary {
+        let zero_point_vmag = rounded_median(&self.zero_points);
         let change = |median: f64| {
             let changes = self.zero_points.iter().map(|zero| (zero - median).abs());
             changes.fold(0.0, f64::max)
         };
         NightSummary {
-            limit50_vmag: median_of(&mut self.limits),
-            predicted_limit50_vmag: median_of(&mut self.predicted),
-            limit_difference_mag: median_of(&mut self.differences),
-            sky_mag_arcsec2: median_of(&mut self.skies),
+            limit50_vmag: rounded_median(&self.limits),
+            predicted_limit50_vmag: rounded_median(&self.predicted),
+            limit_difference_mag: rounded_median(&self.differences),
+            sky_mag_arcsec2: rounded_median(&self.skies),
             zero_point_vmag,
             zero_point_change_mag: zero_point_vmag.map(change).map(rounded),
             pointing_drift_deg: drift_deg(self.pointings).map(rounded),
@@ -166,8 +166,8 @@ impl Night {
     }
 }
 
-fn median_of(values: &mut [f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| rounded(median(values)))
+fn rounded_median(values: &[f64]) -> Option<f64> {
+    median_of(values.iter().copied()).map(rounded)
 }
 
 /// To the digits that values of frames have.

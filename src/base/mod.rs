@@ -1,4 +1,4 @@
-//! What numbers mean: units, angles, directions, dates, statistics, and how numbers are written.
+//! What numbers mean: units, angles, directions, dates, statistics, least squares, and how numbers are written.
 
 pub mod angle;
 pub mod clock;
@@ -9,6 +9,7 @@ pub(crate) mod exponential;
 pub mod files;
 pub mod format;
 pub mod interrupt;
+pub(crate) mod least_squares;
 pub(crate) mod neighbors;
 pub mod panics;
 pub mod remedy;

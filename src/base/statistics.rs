@@ -1,4 +1,4 @@
-//! Distribution functions and medians.
+//! Distribution functions, medians and means.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
@@ -40,6 +40,17 @@ pub fn normal_quantile(probability: f64) -> f64 {
         }
     }
     0.5 * (low + high)
+}
+
+/// The quantile of Student's distribution with the tail probability of the normal quantile `z`.
+///
+/// # Reference
+/// Abramowitz & Stegun 1964, eq. 26.7.5, to the second order: within 2 % from 10 degrees of
+/// freedom.
+pub(crate) fn student_quantile(z: f64, degrees_of_freedom: f64) -> f64 {
+    let first = (z.powi(3) + z) / 4.0;
+    let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
+    z + first / degrees_of_freedom + second / degrees_of_freedom.powi(2)
 }
 
 /// The density of the normal distribution at `z` standard deviations.
@@ -133,12 +144,31 @@ pub const SIGMA_PER_MAD: f64 = 1.482_6;
 /// The median of `values`: the upper one if their number is even, 0 if there are none.
 ///
 /// Reorders `values`.
-pub fn median(values: &mut [f64]) -> f64 {
+pub fn median<T: Copy + Default + Into<f64>>(values: &mut [T]) -> T {
     if values.is_empty() {
-        return 0.0;
+        return T::default();
     }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let order = |a: &T, b: &T| (*a).into().total_cmp(&(*b).into());
+    *values.select_nth_unstable_by(values.len() / 2, order).1
+}
+
+/// The [`median`] of values; `None` if there are none.
+pub fn median_of<T: Copy + Default + Into<f64>>(values: impl Iterator<Item = T>) -> Option<T> {
+    let mut values: Vec<T> = values.collect();
+    (!values.is_empty()).then(|| median(&mut values))
+}
+
+/// The value of ascending ones that is nearest to a share of them; `None` if there are none.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    sorted.get((share * last as f64).round() as usize).copied()
+}
+
+/// The mean of `values`, and the sum of the squares of their deviations from it.
+pub(crate) fn mean_and_squares(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let squares = values.iter().map(|value| (value - mean).powi(2));
+    (mean, squares.sum())
 }
 
 /// Median and standard deviation of normally distributed values with outliers: the latter from the
@@ -147,6 +177,14 @@ pub(crate) fn median_and_sigma(values: &mut [f64]) -> (f64, f64) {
     let center = median(values);
     values.iter_mut().for_each(|v| *v = (*v - center).abs());
     (center, SIGMA_PER_MAD * median(values))
+}
+
+/// Leaves out what is farther from the median than three standard deviations by [`median_and_sigma`], which are at
+/// least `least_sigma`.
+pub(crate) fn clip(values: &mut Vec<f64>, least_sigma: f64) {
+    const SIGMAS: f64 = 3.0;
+    let (center, sigma) = median_and_sigma(&mut values.clone());
+    values.retain(|value| (value - center).abs() <= SIGMAS * sigma.max(least_sigma));
 }
 
 /// The median of values that were rounded to a `step`, to a part of it. What is cut off at either end does not
@@ -247,6 +285,37 @@ mod tests {
         }
         assert!(normal_cdf_and_density(f64::NAN).0.is_nan());
         assert_eq!(normal_cdf_and_density(f64::INFINITY).0, 1.0);
+    }
+
+    #[test]
+    fn quantiles_of_student_are_those_of_the_tables() {
+        // Two-sided 0.1 %, and 1 %.
+        for (degrees_of_freedom, sigmas, expected) in [
+            (10.0, 3.290_5, 4.587),
+            (20.0, 3.290_5, 3.850),
+            (60.0, 3.290_5, 3.460),
+            (10.0, 2.575_8, 3.169),
+            (30.0, 2.575_8, 2.750),
+        ] {
+            let found = student_quantile(sigmas, degrees_of_freedom);
+            assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn medians_quantiles_and_clipping_of_a_few_values() {
+        assert_eq!(median(&mut [4.0_f32, 1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(median::<f64>(&mut []), 0.0);
+        assert_eq!(median_of([2.0, 1.0, 3.0].into_iter()), Some(2.0));
+        assert_eq!(median_of(std::iter::empty::<f32>()), None);
+        let sorted = [1.0, 2.0, 3.0, 4.0];
+        let found = [0.0, 0.5, 0.9, 1.0].map(|share| quantile(&sorted, share));
+        assert_eq!(found, [1.0, 3.0, 4.0, 4.0].map(Some));
+        assert_eq!(quantile(&[], 0.5), None);
+        assert_eq!(mean_and_squares(&sorted), (2.5, 5.0));
+        let mut values = vec![1.0, 2.0, 3.0, 90.0];
+        clip(&mut values, 0.5);
+        assert_eq!(values, [1.0, 2.0, 3.0]);
     }
 
     #[test]

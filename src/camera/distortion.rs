@@ -9,6 +9,8 @@
 //! # Reference
 //! Brown 1971, Photogrammetric Engineering 37, 855.
 
+use crate::base::least_squares::solve_pair;
+
 /// The terms of a lens that are not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
@@ -343,11 +345,7 @@ impl Distortion {
                 );
                 ([uu + a, vu + b], [uv + c, vv + d])
             };
-            let determinant = uu * vv - uv * vu;
-            let step = [
-                (vv * left_u - uv * left_v) / determinant,
-                (uu * left_v - vu * left_u) / determinant,
-            ];
+            let (step, _) = solve_pair([[uu, uv], [vu, vv]], [left_u, left_v]);
             let length = step[0].abs() + step[1].abs();
             if !length.is_finite() {
                 return None;

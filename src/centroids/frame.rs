@@ -11,9 +11,10 @@
 
 use super::list::CentroidList;
 use super::table::{CentroidListError, check_inside};
+use crate::base::least_squares::huber_sigma;
 use crate::base::size::Size;
 use crate::camera::{DistortionModel, agreed_size};
-use crate::identify::fit::{JointFrame, MeasuredStar, fit_jointly, robust_sigma_px};
+use crate::identify::fit::{JointFrame, MeasuredStar, fit_jointly};
 use crate::identify::{Identification, UnknownCentre};
 use nalgebra::Vector2;
 
@@ -143,7 +144,7 @@ fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]
         MeasuredStar {
             pixel: centroid.position,
             icrs: named.light,
-            sigma_px: robust_sigma_px(sigma_px, named.residual_px),
+            sigma_px: huber_sigma(sigma_px, named.residual_px),
         }
     });
     let frame = JointFrame {

@@ -10,7 +10,7 @@
 //! a night of 2000 frames. Noise that is alike in neighbors departs more often: the least step is there
 //! for that.
 
-use crate::base::statistics::median;
+use crate::base::statistics::{SIGMA_PER_MAD, median};
 
 /// Values in a row.
 const IN_A_ROW: usize = 3;
@@ -64,7 +64,7 @@ pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departu
 /// What is usual of a series, and the value above which it is not.
 fn bounds(known: &[(usize, f64)], least_step: f64) -> Option<[f64; 2]> {
     /// Standard deviation over the median size of a difference of two.
-    const PER_DIFFERENCE: f64 = 1.4826 / std::f64::consts::SQRT_2;
+    const PER_DIFFERENCE: f64 = SIGMA_PER_MAD / std::f64::consts::SQRT_2;
     if known.len() < 2 * IN_A_ROW {
         return None;
     }

@@ -12,7 +12,7 @@
 
 use crate::base::coords::{Horizon, PixelPoint, UnitVector};
 use crate::base::format::to_decimals;
-use crate::base::statistics::median;
+use crate::base::statistics::{SIGMA_PER_MAD, median, median_of};
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::observer::Site;
 use crate::frame::{Frame, RowOrder};
@@ -62,8 +62,6 @@ impl Standouts {
     pub fn of(frame: &Frame, mjd: Option<f64>) -> Self {
         /// One of so many pixels tells the noise.
         const SAMPLED: usize = 7;
-        /// Standard deviation of normal noise over its median size.
-        const PER_MEDIAN: f64 = 1.4826;
         let (width, height) = (frame.width, frame.height);
         let mut all = Vec::new();
         let mut sample = Vec::new();
@@ -78,11 +76,8 @@ impl Standouts {
                 }
             }
         }
-        let noise_adu = if sample.is_empty() {
-            f64::INFINITY
-        } else {
-            PER_MEDIAN * median(&mut sample)
-        };
+        let middle = median_of(sample.into_iter());
+        let noise_adu = SIGMA_PER_MAD * middle.unwrap_or(f64::INFINITY);
         let limit_adu = SIGMAS * (noise_adu as f32).max(0.5);
         all.retain(|(_, excess_adu)| *excess_adu > limit_adu);
         Self {

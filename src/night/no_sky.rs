@@ -6,7 +6,7 @@
 
 use super::almanac::is_by_day;
 use crate::base::epoch::ObservationDate;
-use crate::base::statistics::median;
+use crate::base::statistics::{SIGMA_PER_MAD, median_of};
 use crate::frame::{Frame, Pixels};
 use crate::pipeline::{Outcome, Solution};
 use std::path::Path;
@@ -123,8 +123,6 @@ struct Light {
 
 /// Parts along each side.
 const PARTS: usize = 8;
-/// Standard deviation of normal values over their median size.
-const PER_MEDIAN: f64 = 1.4826;
 
 impl Light {
     fn of(frame: &Frame) -> Self {
@@ -145,11 +143,7 @@ impl Light {
         let total = values().count().max(1) as f64;
         let saturated = full.map_or(0, |full| values().filter(|value| *value >= full).count());
         Self {
-            median: if medians.is_empty() {
-                f64::NAN
-            } else {
-                median(&mut medians)
-            },
+            median: median_of(medians.iter().copied()).unwrap_or(f64::NAN),
             full,
             saturated: saturated as f64 / total,
             noise: noise(frame),
@@ -189,8 +183,7 @@ fn part_median(frame: &Frame, part: usize) -> Option<f64> {
     let step = ((x1 - x0) * (y1 - y0) / SAMPLES).max(1) | 1;
     let places = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
     let values = places.step_by(step).map(|(x, y)| f64::from(frame.at(x, y)));
-    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
-    (!values.is_empty()).then(|| median(&mut values))
+    median_of(values.filter(|value| !value.is_nan()))
 }
 
 fn noise(frame: &Frame) -> f64 {
@@ -198,11 +191,8 @@ fn noise(frame: &Frame) -> f64 {
     let step = (frame.width * frame.height / SAMPLES).max(1) | 1;
     let indices = (0..frame.pixels.len().saturating_sub(2)).step_by(step);
     let steps = indices.map(|at| f64::from(frame.pixels.value(at + 2) - frame.pixels.value(at)));
-    let mut steps: Vec<f64> = steps.map(f64::abs).filter(|step| !step.is_nan()).collect();
-    if steps.is_empty() {
-        return f64::INFINITY;
-    }
-    PER_MEDIAN * median(&mut steps) / std::f64::consts::SQRT_2
+    let middle = median_of(steps.map(f64::abs).filter(|step| !step.is_nan()));
+    SIGMA_PER_MAD * middle.unwrap_or(f64::INFINITY) / std::f64::consts::SQRT_2
 }
 
 /// Whether most of what is bright and narrow is a line: where the squares of the gradient's components in a

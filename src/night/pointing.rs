@@ -2,7 +2,7 @@
 
 use super::row::NightRow;
 use crate::base::coords::{Camera, Horizon, Rotation, small_turn_rad};
-use crate::base::statistics::median;
+use crate::base::statistics::{median, median_of};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC};
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -129,10 +129,7 @@ impl PointingHistory {
     /// The median of the recent pointings, as turns from `from`.
     fn middle(&self, from: Rotation<Horizon, Camera>) -> Rotation<Horizon, Camera> {
         let turns: Vec<Vector3<f64>> = self.turns(from).collect();
-        let axis = |axis: usize| {
-            let mut along: Vec<f64> = turns.iter().map(|turn| turn[axis]).collect();
-            median(&mut along)
-        };
+        let axis = |axis: usize| median_of(turns.iter().map(|turn| turn[axis])).unwrap_or(0.0);
         from.then_turn(Vector3::new(axis(0), axis(1), axis(2)))
     }
 

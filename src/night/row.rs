@@ -7,7 +7,7 @@ use super::start::horizon_attitude;
 use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::base::format::{finite, to_decimals};
-use crate::base::statistics::{Estimate, median};
+use crate::base::statistics::{Estimate, median_of};
 use crate::base::table::{Column, columns};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::Identification;
@@ -294,14 +294,9 @@ impl NightRow {
         self.dimming_mag =
             clear_ground_vmag.and_then(|clearest| mag(clearest - clear.ground_vmag()));
         let limits: Vec<[f64; 2]> = sky.cells.iter().filter_map(clear_limit).collect();
-        let median_of = |part: usize| {
-            let mut values: Vec<f64> = limits.iter().map(|limit| limit[part]).collect();
-            (!values.is_empty())
-                .then(|| median(&mut values))
-                .and_then(mag)
-        };
-        self.clear_limit_vmag = median_of(0);
-        self.clear_limit_difference_mag = median_of(1);
+        let middle = |part: usize| mag(median_of(limits.iter().map(|limit| limit[part]))?);
+        self.clear_limit_vmag = middle(0);
+        self.clear_limit_difference_mag = middle(1);
     }
 
     /// Its date, where it has one.

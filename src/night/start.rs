@@ -1,7 +1,7 @@
 //! What the first frames tell of a camera and its night.
 
 use crate::base::coords::{Camera, Horizon, Rotation};
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::camera::KnownLens;
 use crate::ephemeris::observer::Site;
 use crate::identify::lens::{LensFrame, calibrate};
@@ -108,8 +108,7 @@ impl NightStart {
         let clear_sky = clearest(|_| true);
         let exposed_sky = clearest(|probe| probe.has_exposure);
         let spots_px = probes.iter().filter_map(|probe| probe.spot_sigma_px);
-        let mut spots_px: Vec<f64> = spots_px.collect();
-        let spot_sigma_px = (!spots_px.is_empty()).then(|| median(&mut spots_px));
+        let spot_sigma_px = median_of(spots_px);
         let first = probes
             .iter()
             .filter_map(|probe| Some((probe.mjd?, probe.pointing?, probe.sigma_rad)))

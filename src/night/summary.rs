@@ -4,7 +4,7 @@ use super::moments::{Moment, Series};
 use super::pointing::Knock;
 use super::row::NightRow;
 use crate::base::format::finite;
-use crate::base::statistics::median;
+use crate::base::statistics::{median, median_of};
 use crate::ephemeris::observer::Site;
 use serde::Serialize;
 
@@ -119,15 +119,15 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
             .filter(|_| judged > 0 && has_sun),
         darkest_hour: darkest_hour(rows),
         median: Medians {
-            zenith_mag_arcsec2: median_of(rows, |row| row.zenith_mag_arcsec2),
-            limit_vmag: median_of(rows, |row| row.limit_vmag),
-            limit_difference_mag: median_of(rows, |row| row.limit_difference_mag),
-            extinction_mag_per_airmass: median_of(rows, |row| {
+            zenith_mag_arcsec2: median_of_rows(rows, |row| row.zenith_mag_arcsec2),
+            limit_vmag: median_of_rows(rows, |row| row.limit_vmag),
+            limit_difference_mag: median_of_rows(rows, |row| row.limit_difference_mag),
+            extinction_mag_per_airmass: median_of_rows(rows, |row| {
                 row.extinction_mag_per_airmass
                     .filter(|_| row.extinction_measured)
             }),
-            cloud_share: median_of(rows, |row| row.cloud_share),
-            spot_sigma_px: median_of(rows, |row| row.spot_sigma_px),
+            cloud_share: median_of_rows(rows, |row| row.cloud_share),
+            spot_sigma_px: median_of_rows(rows, |row| row.spot_sigma_px),
         },
         moments: Series::new(rows).moments(site, knocks),
         knocks: knocks.to_vec(),
@@ -142,11 +142,8 @@ fn is_clear(row: &NightRow) -> bool {
         && row.dimming_mag.is_none_or(|mag| mag < CLEAR_DIMMING_MAG)
 }
 
-fn median_of(rows: &[NightRow], value: fn(&NightRow) -> Option<f64>) -> Option<f64> {
-    let mut values: Vec<f64> = rows.iter().filter_map(value).collect();
-    (!values.is_empty())
-        .then(|| median(&mut values))
-        .and_then(|value| finite(value, 4))
+fn median_of_rows(rows: &[NightRow], value: fn(&NightRow) -> Option<f64>) -> Option<f64> {
+    finite(median_of(rows.iter().filter_map(value))?, 4)
 }
 
 /// Hours for which frames stand that are like this: each half of the way to its neighbors. `None` where the frames
@@ -196,24 +193,21 @@ fn map(rows: &[NightRow]) -> Vec<MapCell> {
     let cells: Vec<_> = rows.iter().filter_map(|row| row.cells.as_ref()).collect();
     let middles = super::cells::middles_deg();
     let of = |(cell, [altitude_deg, azimuth_deg]): (usize, &[f64; 2])| {
-        let mut mags: Vec<f64> = cells
+        let mags = cells
             .iter()
-            .filter_map(|cells| cells.mag_arcsec2[cell].get())
-            .collect();
+            .filter_map(|cells| cells.mag_arcsec2[cell].get());
         let clear: Vec<f64> = cells
             .iter()
             .filter_map(|cells| cells.clear[cell].get())
             .collect();
         let cloudy = clear.iter().filter(|clear| **clear < 0.5).count();
-        let darkest = mags.iter().copied().reduce(f64::max);
-        let seen = !mags.is_empty() || !clear.is_empty();
+        let darkest = mags.clone().reduce(f64::max);
+        let seen = darkest.is_some() || !clear.is_empty();
         seen.then(|| MapCell {
             altitude_deg: *altitude_deg,
             azimuth_deg: finite(*azimuth_deg, 3).unwrap_or(0.0),
             darkest_mag_arcsec2: darkest.and_then(|mag| finite(mag, 2)),
-            median_mag_arcsec2: (!mags.is_empty())
-                .then(|| median(&mut mags))
-                .and_then(|mag| finite(mag, 2)),
+            median_mag_arcsec2: median_of(mags).and_then(|mag| finite(mag, 2)),
             cloudy: (!clear.is_empty())
                 .then(|| cloudy as f64 / clear.len() as f64)
                 .and_then(|share| finite(share, 3)),

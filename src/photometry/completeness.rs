@@ -24,6 +24,7 @@
 //! Probit regression with a guessing and a lapse rate: Wichmann & Hill 2001, Percept. Psychophys.
 //! 63, 1293.
 
+use crate::base::least_squares::LinearFit;
 use crate::base::statistics::{LnProduct, normal_cdf, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
@@ -229,11 +230,11 @@ struct CurveFit {
     sigma_mag: Option<f64>,
 }
 
-/// The logarithm of a posterior probability, its gradient, and the expected information.
+/// The logarithm of a posterior probability, and the equations of a step: its gradient, and the expected
+/// information.
 struct Likelihood {
     log: f64,
-    gradient: Vector3<f64>,
-    information: Matrix3<f64>,
+    fit: LinearFit<3>,
 }
 
 impl Curve {
@@ -253,12 +254,8 @@ impl Curve {
         let mut current = curve.likelihood(stars);
         let mut damping = 1e-3;
         for _ in 0..MAX_ROUNDS {
-            let mut damped = current.information;
-            for axis in 0..3 {
-                damped[(axis, axis)] *= 1.0 + damping;
-            }
-            let step = damped.cholesky()?.solve(&current.gradient);
-            if step.dot(&current.gradient) < CONVERGED {
+            let step = current.fit.damped(damping).solve()?;
+            if step.dot(&current.fit.vector) < CONVERGED {
                 break;
             }
             let next = curve.moved(&step);
@@ -270,7 +267,7 @@ impl Curve {
                 damping = damping.max(1e-3) * 5.0;
             }
         }
-        let covariance = current.information.try_inverse();
+        let covariance = current.fit.matrix.try_inverse();
         Some(CurveFit {
             curve,
             sigma_mag: covariance
@@ -307,16 +304,18 @@ impl Curve {
             log: -0.5 * off.powi(2)
                 + PRIOR_LOST * libm::log(lost)
                 + PRIOR_KEPT * libm::log(1.0 - lost),
-            gradient: Vector3::new(
-                0.0,
-                -off / LN_WIDTH_SIGMA,
-                PRIOR_LOST - (PRIOR_LOST + PRIOR_KEPT) * lost,
-            ),
-            information: Matrix3::from_diagonal(&Vector3::new(
-                0.0,
-                LN_WIDTH_SIGMA.powi(-2),
-                (PRIOR_LOST + PRIOR_KEPT) * lost * (1.0 - lost),
-            )),
+            fit: LinearFit {
+                matrix: Matrix3::from_diagonal(&Vector3::new(
+                    0.0,
+                    LN_WIDTH_SIGMA.powi(-2),
+                    (PRIOR_LOST + PRIOR_KEPT) * lost * (1.0 - lost),
+                )),
+                vector: Vector3::new(
+                    0.0,
+                    -off / LN_WIDTH_SIGMA,
+                    PRIOR_LOST - (PRIOR_LOST + PRIOR_KEPT) * lost,
+                ),
+            },
         }
     }
 
@@ -339,8 +338,9 @@ impl Curve {
             );
             let (probability, sign) = if detected { (p, 1.0) } else { (1.0 - p, -1.0) };
             let count = count as f64;
-            sum.gradient += change * (count * sign / probability);
-            sum.information += change * change.transpose() * (count / (p * (1.0 - p)));
+            let information = count / (p * (1.0 - p));
+            sum.fit
+                .add(&change, information, count * sign / probability);
             probability
         };
         let brighter_than = |v_mag: f64| stars.partition_point(|star| star.v_mag < v_mag);

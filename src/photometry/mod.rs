@@ -30,7 +30,7 @@ pub(crate) use color_frame::{ColorFrame, PictureColors};
 pub(crate) use identified_frame::IdentifiedFrame;
 pub(crate) use measured::instrumental_mag;
 
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::catalog::StarIndex;
 use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, SkyView};
@@ -112,16 +112,15 @@ pub(crate) fn depth_v_mag(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> f64 
     let matches = &frame.identification.matches;
     let v_mag = |star: StarIndex| f64::from(sky.catalog().star(star).v_mag);
     let mag = |source: &Detection| instrumental_mag(source.flux_adu);
-    let mut offsets: Vec<f64> = matches
+    let offsets = matches
         .iter()
-        .map(|m| v_mag(m.star) - mag(&sources[m.source.get()]))
-        .collect();
+        .map(|m| v_mag(m.star) - mag(&sources[m.source.get()]));
     let faintest = matches.iter().map(|m| v_mag(m.star));
     let faintest_star = sources
         .iter()
         .filter(|source| source.flags.is_star_like() && source.flux_adu > 0.0)
         .map(mag)
         .fold(f64::MIN, f64::max);
-    let by_flux = median(&mut offsets) + faintest_star;
+    let by_flux = median_of(offsets).unwrap_or(0.0) + faintest_star;
     faintest.fold(by_flux, f64::max) + MARGIN_MAG
 }

@@ -3,10 +3,10 @@
 use super::body_in_frame::BodyInFrame;
 use super::outcome::Outcome;
 use super::source::Source;
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::catalog::Catalog;
 use crate::ephemeris::solar_system::{Body, BodyKind, bodies_within};
-use crate::identify::{Identification, Priors, SourceIndex};
+use crate::identify::{Identification, Priors, SourceIndex, StarMatch};
 use crate::photometry::instrumental_mag;
 use std::collections::HashMap;
 
@@ -72,16 +72,12 @@ impl<'a> Field<'a> {
     fn new(found: &'a Identification, sources: &'a [Source], catalog: &Catalog) -> Self {
         let v_mag = |star| f64::from(catalog.star(star).v_mag);
         let named = found.matches.iter().map(|m| (m.source, v_mag(m.star)));
-        let mut zero_points: Vec<f64> = found
-            .matches
-            .iter()
-            .filter_map(|m| Some(v_mag(m.star) - mag(&sources[m.source.get()])?))
-            .collect();
+        let of_match = |m: &StarMatch| Some(v_mag(m.star) - mag(&sources[m.source.get()])?);
         Self {
             found,
             sources,
             named_v_mag: named.collect(),
-            zero_point_mag: (!zero_points.is_empty()).then(|| median(&mut zero_points)),
+            zero_point_mag: median_of(found.matches.iter().filter_map(of_match)),
         }
     }
 
@@ -155,7 +151,7 @@ mod tests {
     use crate::ephemeris::places::StarPlaces;
     use crate::ephemeris::solar_system::TimeError;
     use crate::ephemeris::solar_system::bodies_at;
-    use crate::identify::{DateSource, FrameDate, StarMatch};
+    use crate::identify::{DateSource, FrameDate};
     use nalgebra::Matrix3;
 
     const FOCAL_PX: f64 = 4000.0;

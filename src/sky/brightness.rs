@@ -8,7 +8,7 @@ use super::grid::Grid;
 use super::lens_circle::LensCircle;
 use super::picture::Picture;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
-use crate::base::statistics::{Estimate, median};
+use crate::base::statistics::{Estimate, median_of};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::{BackgroundMap, least_cell_px};
 use crate::model::sensitivity::SkyBrightness;
@@ -278,8 +278,7 @@ impl Levels {
 
     /// The median level of the sky, in ADU.
     pub(super) fn median_adu(&self) -> Option<f64> {
-        let mut levels: Vec<f64> = self.places.iter().map(|place| place.level_adu).collect();
-        (!levels.is_empty()).then(|| median(&mut levels))
+        median_of(self.places.iter().map(|place| place.level_adu))
     }
 
     /// The light in other units, of which `light` tells that of a level.

@@ -1,7 +1,7 @@
 //! The level of a pixel without light.
 
 use crate::base::coords::PixelPoint;
-use crate::base::statistics::{Estimate, median, median_of_rounded};
+use crate::base::statistics::{Estimate, mean_and_squares, median, median_of_rounded};
 use crate::detect::{Circle, Detections};
 use crate::frame::Frame;
 
@@ -94,16 +94,11 @@ pub(super) fn unlit_adu(frame: &Frame, circle: &Circle) -> Option<Estimate> {
         return None;
     }
     let count = levels.len() as f64;
-    let mean_adu = levels.iter().sum::<f64>() / count;
-    let variance = levels
-        .iter()
-        .map(|level| (level - mean_adu).powi(2))
-        .sum::<f64>()
-        / (count - 1.0);
+    let (_, squares) = mean_and_squares(&levels);
     // A corner in which something shines does not count.
     Some(Estimate {
         value: median(&mut levels),
-        sigma: (variance / count).sqrt(),
+        sigma: (squares / (count - 1.0) / count).sqrt(),
     })
 }
 

@@ -513,17 +513,10 @@ impl StarBrightness {
         noises.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fainter = noises.len().div_ceil(2);
         let mut of_faint: Vec<f64> = noises[..fainter].iter().map(|noise| noise.1).collect();
-        let middle = |values: &mut [f64]| {
-            if values.is_empty() {
-                0.0
-            } else {
-                median(values)
-            }
-        };
         let area_px2 = (solution.width * solution.height) as f64;
         Self {
-            zero_point_mag: middle(&mut zero_points),
-            least_flux_adu: MIN_SNR * middle(&mut of_faint).max(f64::MIN_POSITIVE),
+            zero_point_mag: median(&mut zero_points),
+            least_flux_adu: MIN_SNR * median(&mut of_faint).max(f64::MIN_POSITIVE),
             background_adu: solution.background.map_or(0.0, |b| b.level_adu),
             saturation_adu,
             density_px2: solution.sources.len().max(1) as f64 / area_px2,

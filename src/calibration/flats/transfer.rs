@@ -1,7 +1,8 @@
 //! Photon transfer: the gain from the shot noise of light.
 
+use crate::base::least_squares::LinearFit;
 use crate::calibration::robust::Moments;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
 /// Signal and variance of two frames of the same light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,14 +115,13 @@ impl Gain {
 
     /// Fits the weighted line V = R² + S / g.
     fn from_line(pairs: &[PairPoint]) -> Option<Self> {
-        let (mut matrix, mut vector) = (Matrix2::zeros(), Vector2::zeros());
+        let mut fit = LinearFit::new();
         for pair in pairs {
             let row = Vector2::new(1.0, pair.signal_adu) / pair.sigma_adu2;
-            matrix += row * row.transpose();
-            vector += row * (pair.variance_adu2 / pair.sigma_adu2);
+            fit.add(&row, 1.0, pair.variance_adu2 / pair.sigma_adu2);
         }
-        let covariance = matrix.try_inverse()?;
-        let line = covariance * vector;
+        let covariance = fit.matrix.try_inverse()?;
+        let line = covariance * fit.vector;
         let (intercept, slope) = (line[0], line[1]);
         let chi_sq = |p: &PairPoint| {
             ((p.variance_adu2 - intercept - slope * p.signal_adu) / p.sigma_adu2).powi(2)

@@ -9,11 +9,12 @@
 //! indi-allsky, `indi_allsky/lens_solver/projection.py`.
 
 use super::error::FormatError;
-use super::fit::{grid, least_squares};
+use super::fit::grid;
 use super::pointing::Pointing;
 use super::sky::Sky;
 use crate::CameraModel;
 use crate::base::coords::{PixelPoint, Rotation};
+use crate::base::least_squares::levenberg_marquardt;
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::Projection;
 use crate::ephemeris::places::StarPlaces;
@@ -203,7 +204,7 @@ fn fit(points: &[Point], to_lens: &Matrix3<f64>, start: &[f64], fixed: usize) ->
             .collect::<Vec<f64>>()
     };
     let steps = [1e-2, 1e-2, 1e-2, 1e-5, 1e-6, 1e-6, 1e-6];
-    let found = least_squares(&start[fixed..], &steps[fixed..], |free, residuals| {
+    let found = levenberg_marquardt(&start[fixed..], &steps[fixed..], |free, residuals| {
         let parameters = all(free);
         let to_lens = turned(&parameters, to_lens);
         points.iter().all(|point| {

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::Value;
 use starpipe::archive::{Archive, FrameSummary, NightSummary, frames, status};
 use starpipe::base::format::counted;
-use starpipe::base::statistics::median;
+use starpipe::base::statistics::{median, quantile};
 use starpipe::report::page::{Fact, Page, PageFigure};
 use std::collections::BTreeMap;
 
@@ -112,13 +112,13 @@ fn facts(frames: &[FrameSummary], nights: &[NightSummary]) -> Vec<Fact> {
     let mut facts = Vec::new();
     let mut add = |name: &str, unit: &str, value: fn(&FrameSummary) -> Option<f64>| {
         let mut values: Vec<f64> = frames.iter().filter_map(value).collect();
-        if values.is_empty() {
-            return;
-        }
         values.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
-        let text = format!("{:.2}{unit} ({:.2} to {:.2})", at(0.5), at(0.05), at(0.95));
-        facts.push(Fact::new(name, text));
+        if let [Some(middle), Some(low), Some(high)] =
+            [0.5, 0.05, 0.95].map(|share| quantile(&values, share))
+        {
+            let text = format!("{middle:.2}{unit} ({low:.2} to {high:.2})");
+            facts.push(Fact::new(name, text));
+        }
     };
     add("Half of the stars are found at V", "", |f| f.limit50_vmag);
     add("Predicted", "", |f| f.predicted_limit50_vmag);

@@ -2,7 +2,7 @@
 
 use crate::cli::exit::Tally;
 use starpipe::base::format::counted;
-use starpipe::base::statistics::median;
+use starpipe::base::statistics::median_of;
 use starpipe::report::FrameReport;
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -95,8 +95,7 @@ impl Summary {
         if tally.failed > 0 {
             parts.push(format!("{} not read", tally.failed));
         }
-        if !self.limits_vmag.is_empty() {
-            let median = median(&mut self.limits_vmag);
+        if let Some(median) = median_of(self.limits_vmag.iter().copied()) {
             parts.push(format!("median limit V {median:.2}"));
         }
         let rate = all as f64 / self.start.elapsed().as_secs_f64().max(1e-9);

@@ -15,7 +15,7 @@
 use super::censored_noise::CensoredNoise;
 use super::grid::CellGrid;
 use super::mesh::Mesh;
-use crate::base::statistics::normal_quantile;
+use crate::base::statistics::{median, normal_quantile};
 use crate::detect::pixels::View;
 
 /// Noise whose background is more than this many standard deviations above the lowest value is not
@@ -101,8 +101,7 @@ impl CutOff {
         let mut median_of = |values: &mut dyn Iterator<Item = f32>| {
             self.sorted.clear();
             self.sorted.extend(values);
-            self.sorted.sort_unstable_by(f32::total_cmp);
-            self.sorted.get(self.sorted.len() / 2).copied()
+            (!self.sorted.is_empty()).then(|| median(&mut self.sorted))
         };
         let sigma = median_of(&mut known().map(|(sigma, _)| sigma));
         let edge = median_of(&mut known().map(|(_, edge)| edge));

@@ -6,6 +6,7 @@ use super::cut_off::CutOff;
 use super::mesh::Mesh;
 use super::mesh_config::MeshConfig;
 use crate::base::interrupt::Interrupted;
+use crate::base::statistics;
 use crate::detect::pixels::{BlockMaxima, View, largest_magnitude_in_row, lower, lowest_in_row};
 
 /// Noise below this multiple of that of rounding, about half a step, is coarse: a few isolated
@@ -118,9 +119,5 @@ pub(crate) fn sigma_floor(view: &View<'_>, step_adu: f32, row: &mut Vec<f32>) ->
 pub(crate) fn median(values: &[f32], sorted: &mut Vec<f32>) -> f64 {
     sorted.clear();
     sorted.extend_from_slice(values);
-    let middle = sorted.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1)
+    statistics::median(sorted).into()
 }

@@ -2,9 +2,10 @@
 
 use super::edge::{Edge, RING_PX, Ring, RingPixel};
 use super::window::Window;
+use crate::base::least_squares::LinearFit;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
 /// A plane, and what is not in it.
 #[derive(Debug, Clone, Copy)]
@@ -143,8 +144,7 @@ fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>
     let first = f64::from(ring.first()?.value);
     let mut found: Option<(SVector<f64, N>, f64)> = None;
     for _ in 0..ROUNDS {
-        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::zeros());
-        let (mut used, mut squares) = (0.0, 0.0);
+        let (mut fit, mut used, mut squares) = (LinearFit::new(), 0.0, 0.0);
         for pixel in ring {
             let [x, y] = pixel.from_middle.map(f64::from);
             let all = [1.0, x, y, x * x, x * y, y * y];
@@ -156,16 +156,15 @@ fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>
             if found.is_some_and(is_off) {
                 continue;
             }
-            normal += terms * terms.transpose();
-            right += terms * value;
+            fit.add(&terms, 1.0, value);
             squares += value * value;
             used += 1.0;
         }
         if used < (MIN_SHARE * ring.len() as f64).max(N as f64 + 1.0) {
             return None;
         }
-        let surface = normal.cholesky()?.solve(&right);
-        let variance = (squares - surface.dot(&right)) / (used - N as f64);
+        let surface = fit.solve()?;
+        let variance = (squares - surface.dot(&fit.vector)) / (used - N as f64);
         found = Some((surface, variance.max(0.0)));
     }
     let (mut surface, variance) = found?;

@@ -3,10 +3,11 @@
 //! pixels around the window → direction in which they get darker or brighter → the place on it that parts
 //! them best
 
+use crate::base::least_squares::LinearFit;
 use crate::base::statistics::median;
 use crate::detect::psf::MAX_WINDOW_PX;
 use arrayvec::ArrayVec;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{SVector, Vector2, Vector3};
 
 /// Breadth of the ring of pixels around a window that tells its background, in pixels.
 pub(super) const RING_PX: usize = 5;
@@ -91,14 +92,12 @@ impl Limits {
 
     /// The direction in which the pixels of a ring get brighter or darker.
     fn steepest(&self, ring: &[RingPixel]) -> Option<[f64; 2]> {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut fit = LinearFit::new();
         for pixel in ring {
             let [x, y] = pixel.from_middle.map(f64::from);
-            let terms = Vector3::new(1.0, x, y);
-            normal += terms * terms.transpose();
-            right += terms * self.clip(pixel);
+            fit.add(&Vector3::new(1.0, x, y), 1.0, self.clip(pixel));
         }
-        let plane = normal.cholesky()?.solve(&right);
+        let plane = fit.solve()?;
         let slope = libm::hypot(plane[1], plane[2]);
         (slope > 0.0).then(|| [plane[1] / slope, plane[2] / slope])
     }
@@ -203,15 +202,12 @@ impl Profile {
         &self,
         terms: impl Fn(f64) -> SVector<f64, N>,
     ) -> Option<(SVector<f64, N>, f64)> {
-        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::zeros());
-        let mut squares = 0.0;
+        let (mut fit, mut squares) = (LinearFit::new(), 0.0);
         for bin in &self.bins {
-            let terms = terms(bin.place);
-            normal += terms * terms.transpose() * bin.count;
-            right += terms * bin.sum;
+            fit.add(&terms(bin.place), bin.count, bin.sum);
             squares += bin.sum * bin.sum / bin.count;
         }
-        let found = normal.cholesky()?.solve(&right);
-        Some((found, squares - right.dot(&found)))
+        let found = fit.solve()?;
+        Some((found, squares - fit.vector.dot(&found)))
     }
 }

@@ -2,6 +2,7 @@
 //! astigmatic. What is elongated is a trail only beyond that shape.
 
 use super::core::Core;
+use crate::base::statistics::median;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::fit::FrameMaps;
 use arrayvec::ArrayVec;
@@ -50,12 +51,11 @@ impl StarShape {
         if shapes.len() < MIN_STARS {
             return Self::default();
         }
-        let median = |value: &dyn Fn(usize) -> f64| {
+        let median_of = |value: &dyn Fn(usize) -> f64| {
             let mut values: ArrayVec<f64, MAX_STARS> = (0..cores.len()).map(value).collect();
-            values.sort_unstable_by(f64::total_cmp);
-            values[values.len() / 2]
+            median(&mut values)
         };
-        let ellipticity = [0, 1].map(|i| median(&|star| shapes[star][i]));
+        let ellipticity = [0, 1].map(|i| median_of(&|star| shapes[star][i]));
         let is_alike = |s: &&[f64; 2]| {
             libm::hypot(s[0] - ellipticity[0], s[1] - ellipticity[1]) < MAX_DEVIATION
         };
@@ -63,7 +63,7 @@ impl StarShape {
         let are_elongated = libm::hypot(ellipticity[0], ellipticity[1]) > MIN_ELLIPTICITY;
         let elongation = Elongation {
             ellipticity,
-            area_px: median(&|star| cores[star].area_px),
+            area_px: median_of(&|star| cores[star].area_px),
         };
         Self {
             // Sharp stars, too small to have a shape, are not elongated.

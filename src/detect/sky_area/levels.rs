@@ -1,6 +1,7 @@
 //! The brightness of a frame in cells.
 
 use crate::base::coords::PixelPoint;
+use crate::base::statistics::median;
 use crate::frame::Frame;
 
 /// Cells along the longer side of a frame.
@@ -53,7 +54,7 @@ impl Levels {
         let cells = Cells::of(frame);
         let (cell_px, columns) = (cells.side_px, cells.columns);
         let mut samples = Vec::with_capacity(SAMPLES * SAMPLES);
-        let mut median = |cell: usize| {
+        let mut level = |cell: usize| {
             let [x, y] = [cell % columns, cell / columns].map(|at| at * cell_px);
             samples.clear();
             for step in 0..SAMPLES * SAMPLES {
@@ -65,13 +66,12 @@ impl Levels {
                 }
             }
             samples.retain(|value| value.is_finite());
-            let middle = samples.len() / 2;
             match samples.is_empty() {
                 true => f32::NAN,
-                false => *samples.select_nth_unstable_by(middle, f32::total_cmp).1,
+                false => median(&mut samples),
             }
         };
-        let adu: Vec<f32> = (0..columns * cells.rows).map(&mut median).collect();
+        let adu: Vec<f32> = (0..columns * cells.rows).map(&mut level).collect();
         Self {
             cells,
             adu,

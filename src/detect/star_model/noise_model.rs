@@ -6,6 +6,7 @@
 use super::bright_stars::MAX_MODEL_ERROR;
 use super::departure::{CommonElongation, is_departure};
 use super::spot_size::{BrightStars, MAX_STARS, MODE_WIDTH, weighted_size};
+use crate::base::least_squares::solve_pair;
 use crate::detect::fit::{
     AnyLight, BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel,
     ONE_SPOT, SpotEstimate, SpotLight, Window, WindowPixels, linearise, sum_of,
@@ -180,12 +181,10 @@ impl Moments {
             shot_adu: finite(shot),
             model_error2: finite(error2).min(MAX_MODEL_ERROR * MAX_MODEL_ERROR),
         };
-        let determinant = a * c - b * b;
+        let ([shot, error2], determinant) = solve_pair([[a, b], [b, c]], [p, q]);
         if determinant <= 1e-9 * a * c || !determinant.is_finite() {
             return noise_model(0.0, q / c);
         }
-        let shot = (p * c - q * b) / determinant;
-        let error2 = (q * a - p * b) / determinant;
         let chance = SIGNIFICANT_SIGMA * (2.0 * a / determinant).sqrt();
         if error2 < chance {
             noise_model(p / a, 0.0)

@@ -12,6 +12,7 @@
 //! measured: on both sides of an edge the filtered frame is far off.
 
 use crate::base::size::Size;
+use crate::base::statistics::median_of;
 use crate::detect::background::{CellGrid, Mesh};
 use crate::detect::pixels::{BLOCK_PX, Widened, packed, with_widened};
 use multiversion::multiversion;
@@ -126,13 +127,11 @@ impl Extrema {
     /// `most`, in standard deviations.
     pub fn raised(&mut self, u: f64, per_mpx: f64, most: f64) -> f64 {
         let thresholds = self.heights.iter_mut();
-        let mut found: Vec<f64> = thresholds
-            .filter_map(|sides| sides.threshold(per_mpx))
-            .collect();
-        found.sort_unstable_by(f64::total_cmp);
+        let found = thresholds.filter_map(|sides| sides.threshold(per_mpx));
+        let middle = median_of(found);
         let error = MIN_RAISE / (self.heights.len() as f64).sqrt();
-        match found.get(found.len() / 2) {
-            Some(&middle) if middle > u + error => middle.min(most).max(u),
+        match middle {
+            Some(middle) if middle > u + error => middle.min(most).max(u),
             _ => u,
         }
     }

@@ -1,5 +1,6 @@
 //! A square of pixels around an expected star, with its background and noise.
 
+use crate::base::statistics::median;
 use crate::detect::background::rounding_sigma_adu;
 use crate::detect::fit::Window;
 use crate::detect::pixels::Samples;
@@ -158,10 +159,6 @@ fn clipped(values: &[f32]) -> [f32; 3] {
     if parts == 0 {
         return [0.0; 3];
     }
-    let median = |values: &mut [f32]| {
-        values.sort_unstable_by(f32::total_cmp);
-        values[values.len() / 2]
-    };
     let mut mean = median(&mut means[..parts]);
     let mut variance = median(&mut variances[..parts]).max(0.0);
     let mut used = 0.0;

@@ -4,6 +4,7 @@ use super::peak::{MatchedFilter, PADDING, WindowPeak};
 use super::spot_model::{SpotModel, smear_variance_px2, without_smear};
 use super::square::{Square, nearest};
 use crate::base::coords::PixelPoint;
+use crate::base::statistics::median;
 use crate::detect::fit::{
     BatchStart, Fit, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, Window,
     window_radius,
@@ -150,11 +151,10 @@ impl WindowDetector {
         pixels.resize(pixels.len() + PADDING, 0.0);
         // The noise of one ring is uncertain by some percents: where chance explains that it
         // differs, all windows have the same.
-        let middle = noises.len() / 2;
-        if middle == 0 {
+        if noises.len() < 2 {
             return;
         }
-        let typical = *noises.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let typical = median(noises);
         for square in squares.iter_mut().flatten() {
             let error = (2.0 * square.ring_pixels.max(2) as f32).sqrt().recip();
             if (square.noise_adu / typical - 1.0).abs() < OWN_NOISE_SIGMAS * error {

@@ -6,7 +6,7 @@
 //! mosaic has the same filter twice, on a diagonal. Where more light passes there is more shot noise,
 //! as well.
 
-use crate::base::statistics::median_and_sigma;
+use crate::base::statistics::{clip, mean_and_squares, median_and_sigma};
 use crate::frame::Frame;
 use crate::frame::bayer_pattern::{BayerPattern, Diagonal};
 
@@ -224,20 +224,14 @@ fn patch_at(frame: &Frame, x0: usize, y0: usize, values: &mut Vec<f64>) -> Optio
 
 /// Mean and variance of the pixels without stars; `None` where hardly any has a value.
 fn background_of(values: &mut Vec<f64>, step_adu: f64) -> Option<(f64, f64)> {
-    /// Pixels farther from the median than this are those of stars, in standard deviations.
-    const CLIP_SIGMA: f64 = 3.0;
     const MIN: usize = PATCH_PX * PATCH_PX / 8;
     values.retain(|value| !value.is_nan());
     if values.len() < MIN {
         return None;
     }
-    let (center, sigma) = median_and_sigma(&mut values.clone());
-    let limit = (CLIP_SIGMA * sigma).max(1.5 * step_adu);
-    values.retain(|value| (value - center).abs() <= limit);
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    Some((mean, squares / count))
+    clip(values, 0.5 * step_adu);
+    let (mean, squares) = mean_and_squares(values);
+    Some((mean, squares / values.len() as f64))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Trails: stars elongated in one direction, because the camera or the sky moved.
 
 use super::cause::Diagnosis;
+use crate::base::statistics::median_of;
 use crate::detect::{BackgroundMap, Detection, Detections};
 use crate::frame::Frame;
 use image::{GrayImage, Luma};
@@ -69,12 +70,11 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
     if libm::hypot(sum[0], sum[1]) < ALIGNMENT * count as f64 {
         return None;
     }
-    let mut lengths: Vec<f64> = trails.iter().map(|bar| bar.length_px).collect();
-    lengths.sort_by(f64::total_cmp);
+    let lengths_px = trails.iter().map(|bar| bar.length_px);
     Some(Diagnosis::Trails {
         trails: count,
         angle_rad: libm::atan2(sum[1], sum[0]) / 2.0,
-        length_px: lengths[count / 2],
+        length_px: median_of(lengths_px)?,
     })
 }
 

@@ -38,16 +38,6 @@ impl MeasuredStar {
     }
 }
 
-/// The standard error of an outlier (with an unresolved companion, for example) as it counts in a fit:
-/// it grows with the residual, so that it pulls no harder than other stars (Huber 1964, Ann. Math. Stat.
-/// 35, 73).
-pub(crate) fn robust_sigma_px(sigma_px: f64, residual_px: f64) -> f64 {
-    /// Residual in standard errors beyond which a star pulls no harder.
-    const HUBER_SIGMAS: f64 = 2.5;
-    let excess = residual_px / (HUBER_SIGMAS * sigma_px);
-    sigma_px * excess.max(1.0).sqrt()
-}
-
 /// Parameters without distortion: rotation about three axes, and ln f.
 pub const POSE_PARAMETERS: usize = 4;
 /// Parameters with all terms of a lens.

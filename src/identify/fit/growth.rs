@@ -7,11 +7,10 @@
 //! that are predicted so well that chance seldom puts a detection there are paired, and only a step
 //! beyond those that agree: a lens that is wrong out there finds chance pairs and follows them.
 
-use super::adjustment::{
-    Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor, robust_sigma_px,
-};
+use super::adjustment::{Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor};
 use super::lens_choice::with_projection;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::base::least_squares::huber_sigma;
 use crate::base::neighbors::PointGrid;
 use crate::base::statistics::{log10_binomial_tail, median};
 use crate::base::units::RAD_PER_DEG;
@@ -149,7 +148,7 @@ impl Growth {
             for (star, of_seed) in self.stars.iter_mut().zip(seed.stars) {
                 let seen = fitted.icrs_to_camera.apply(&star.icrs);
                 let residual_px = fitted.camera.pixel_of(&seen)?.distance_to(&star.pixel);
-                star.sigma_px = robust_sigma_px(of_seed.sigma_px, residual_px);
+                star.sigma_px = huber_sigma(of_seed.sigma_px, residual_px);
             }
             fitted = fit(&self.stars, &fitted.camera, &fitted.icrs_to_camera)?;
         }
@@ -241,7 +240,7 @@ impl Growth {
                 self.stars.push(MeasuredStar {
                     pixel: observed.position,
                     icrs: star.direction,
-                    sigma_px: robust_sigma_px(sigma_px, distance_px),
+                    sigma_px: huber_sigma(sigma_px, distance_px),
                 });
                 self.differences_mag
                     .push(f64::from(star.v_mag) - observed.mag);

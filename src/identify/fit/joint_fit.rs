@@ -5,10 +5,9 @@
 
 use super::adjustment::{KnownAxis, MeasuredStar, Predictor, USUAL_TERMS, usual_term_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::least_squares::LinearFit;
 use crate::camera::{CameraModel, Distortion, DistortionModel};
-use nalgebra::{
-    Cholesky, Const, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Matrix4, Vector3, Vector4,
-};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Vector3, Vector4};
 
 /// Maximum number of steps.
 const MAX_STEPS: usize = 40;
@@ -114,19 +113,18 @@ pub(crate) fn fit_scale(
     icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> Option<[f64; 2]> {
     let predictor = Predictor::new(camera, icrs_to_camera, camera.distortion_model());
-    let (mut matrix, mut vector) = (Matrix4::zeros(), Vector4::zeros());
+    let mut fit = LinearFit::new();
     for star in stars {
         let by_pose = predictor.predict(&star.icrs)?.by_pose;
         let residual_px = residual_px(&predictor, star)?;
         for (by, residual_px) in by_pose.into_iter().zip(residual_px) {
             let row = Vector4::from(by) / star.sigma_px;
-            matrix += row * row.transpose();
-            vector += row * (residual_px / star.sigma_px);
+            fit.add(&row, 1.0, residual_px / star.sigma_px);
         }
     }
-    let root = matrix.cholesky()?;
     // The last is ln f: residuals are small, so one step is enough.
-    Some([root.solve(&vector)[3], root.inverse()[(3, 3)].sqrt()])
+    let (change, covariance) = fit.solve_with_covariance()?;
+    Some([change[3], covariance[(3, 3)].sqrt()])
 }
 
 fn residual_px(predictor: &Predictor, star: &MeasuredStar) -> Option<[f64; 2]> {

@@ -3,13 +3,13 @@
 //! pairing → fit → pairing within a smaller radius → … with as much lens distortion as the stars
 //! support
 
-use super::adjustment::robust_sigma_px;
 use super::camera_fit::fit_with_unshown_terms;
 use super::lens_choice::{
     ChosenLens, Lens, LensChoice, depend_on_place, is_affordable, with_projection,
 };
 use super::{CameraFit, MeasuredStar, fit_camera, fit_known_lens};
 use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::least_squares::huber_sigma;
 use crate::base::statistics::median;
 use crate::camera::{CameraModel, DistortionModel, KnownLens};
 use crate::identify::field::{ObservedStar, Photometry, StarField};
@@ -430,7 +430,7 @@ impl Refiner {
         let measured = |pair: &Pair| {
             let star = &problem.field.stars[pair.observed];
             let mut measured = MeasuredStar::of(star, pair, excess_px);
-            measured.sigma_px = robust_sigma_px(measured.sigma_px, pair.residual_px);
+            measured.sigma_px = huber_sigma(measured.sigma_px, pair.residual_px);
             measured
         };
         self.stars.clear();

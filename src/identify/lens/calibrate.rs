@@ -9,10 +9,11 @@ use super::frames::{LeftOutFrame, LensFrame, Unfit};
 use super::mount::Mount;
 use super::repeats::{CommonError, Repeats, StarError};
 use super::scale_drift::{FrameScale, ScaleDrift};
+use crate::base::least_squares::huber_sigma;
 use crate::base::statistics::median;
 use crate::camera::formats::Pointing;
 use crate::camera::{CameraModel, KnownLens};
-use crate::identify::fit::{JointFit, JointFrame, fit_jointly, robust_sigma_px};
+use crate::identify::fit::{JointFit, JointFrame, fit_jointly};
 use std::f64::consts::LN_2;
 
 /// Start of the comment before the table of a lens.
@@ -405,7 +406,7 @@ fn reweighed(
                 let sigma_px = libm::hypot(star.sigma_px, excess_sigma_px);
                 StarError {
                     noise_px: star.sigma_px,
-                    sigma_px: robust_sigma_px(sigma_px, libm::hypot(x, y)),
+                    sigma_px: huber_sigma(sigma_px, libm::hypot(x, y)),
                     residual_px: *residual,
                 }
             })

@@ -2,11 +2,11 @@
 
 use super::repeats::Repeats;
 use crate::base::coords::{Camera, Icrs, Rotation};
+use crate::base::least_squares::huber_sigma;
 use crate::base::statistics::median;
 use crate::camera::{CameraModel, DistortionModel, Projection};
 use crate::identify::fit::{
-    JointFrame, WIDE_RAD, fit_jointly, is_affordable, least_gain, residuals_px, robust_sigma_px,
-    worth_a_projection,
+    JointFrame, WIDE_RAD, fit_jointly, is_affordable, least_gain, residuals_px, worth_a_projection,
 };
 use std::f64::consts::LN_2;
 
@@ -120,7 +120,7 @@ fn test(parted: &Parted, start: &CameraModel, model: Option<DistortionModel>) ->
         for (left_out, attitude) in part(true).iter().zip(&fit.attitudes) {
             let residuals = residuals_px(&left_out.stars, &fit.camera, attitude)?;
             for (star, [x, y]) in left_out.stars.iter().zip(residuals) {
-                let sigma_px = robust_sigma_px(star.sigma_px, libm::hypot(x, y));
+                let sigma_px = huber_sigma(star.sigma_px, libm::hypot(x, y));
                 chi_sq += (x * x + y * y) / (sigma_px * sigma_px);
                 squares.push(x * x + y * y);
             }

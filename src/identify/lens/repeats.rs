@@ -7,9 +7,10 @@
 //! which C is in common, each counts with T + (n − 1) C (Kish 1965, Survey Sampling, § 5.4).
 
 use super::frames::LensFrame;
+use crate::base::least_squares::{huber_sigma, solve_pair};
 use crate::base::statistics::median;
 use crate::catalog::StarIndex;
-use crate::identify::fit::{JointFit, JointFrame, robust_sigma_px};
+use crate::identify::fit::{JointFit, JointFrame};
 use std::collections::HashMap;
 
 /// Where the stars of frames repeat: a place is a star in the frames of one direction.
@@ -185,7 +186,7 @@ impl MeanResidual {
             .map(|sum| sum / self.observations);
         let variance_px2 = common_px2 + single_px2 / self.observations;
         let [x, y] = self.residuals_px.map(|sum| sum / self.observations);
-        robust_sigma_px(variance_px2.sqrt(), libm::hypot(x, y)).powi(2) - variance_px2
+        huber_sigma(variance_px2.sqrt(), libm::hypot(x, y)).powi(2) - variance_px2
     }
 }
 
@@ -251,24 +252,18 @@ impl CommonError {
             }
         }
         let [nn, n, one, nx, ny, x, y] = total;
-        let matrix = [2.0 * nn, 2.0 * n, 2.0 * one];
+        let [aa, ab, bb] = [nn, n, one].map(|sum| 2.0 * sum);
         let vector = [nx + ny, x + y];
         let share = |[share, variance_px2]: [f64; 2]| Self {
             noise_share: (share / left).clamp(0.0, 1.0),
             variance_px2: (variance_px2 / left).max(0.0),
         };
-        let determinant = matrix[0] * matrix[2] - matrix[1] * matrix[1];
-        let both = [
-            (vector[0] * matrix[2] - vector[1] * matrix[1]) / determinant,
-            (vector[1] * matrix[0] - vector[0] * matrix[1]) / determinant,
-        ];
+        let (both, determinant) = solve_pair([[aa, ab], [ab, bb]], vector);
         // Neither is below 0, and errors that are all equal do not tell them apart.
         match both {
-            [a, b] if a >= 0.0 && b >= 0.0 && determinant > 1e-9 * matrix[0] * matrix[2] => {
-                share(both)
-            }
-            [a, _] if a < 0.0 && matrix[2] > 0.0 => share([0.0, vector[1] / matrix[2]]),
-            _ if matrix[0] > 0.0 => share([vector[0] / matrix[0], 0.0]),
+            [a, b] if a >= 0.0 && b >= 0.0 && determinant > 1e-9 * aa * bb => share(both),
+            [a, _] if a < 0.0 && bb > 0.0 => share([0.0, vector[1] / bb]),
+            _ if aa > 0.0 => share([vector[0] / aa, 0.0]),
             _ => Self::default(),
         }
     }
@@ -340,7 +335,7 @@ mod tests {
         };
         let star = |residual_px| StarError {
             noise_px: 0.08,
-            sigma_px: robust_sigma_px(0.1, residual_px),
+            sigma_px: huber_sigma(0.1, residual_px),
             residual_px: [residual_px, 0.0],
         };
         // The second has a neighbour; the third was hit by a cosmic ray in one frame.

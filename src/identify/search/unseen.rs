@@ -4,6 +4,7 @@
 //! points elsewhere, next to none of the brightest stars are seen, however many faint ones agree
 //! with detections by chance.
 
+use crate::base::statistics::median;
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
 use crate::identify::predict::{PredictedStar, PredictionDepth, Surroundings};
@@ -35,11 +36,10 @@ impl Unseen {
         let Self { predicted, v_mags } = self;
         v_mags.clear();
         v_mags.extend(named.iter().map(|pair| pair.v_mag));
-        let middle = v_mags.len() / 2;
         if v_mags.is_empty() {
             return 0.0;
         }
-        let (_, faintest, _) = v_mags.select_nth_unstable_by(middle, f32::total_cmp);
+        let faintest = median(v_mags);
         hypothesis.predict_at_least(problem, depth_of(BRIGHTEST), around, predicted);
         let residuals = named.iter().map(|pair| pair.residual_px);
         let radius_px = residuals.fold(MIN_RADIUS_PX, f64::max);
@@ -58,7 +58,7 @@ impl Unseen {
             .filter(|star| hypothesis.camera.contains(&star.pixel) && field.shows_sky(&star.pixel));
         let bright = in_frame
             .take(BRIGHTEST)
-            .take_while(|star| star.v_mag <= *faintest);
+            .take_while(|star| star.v_mag <= faintest);
         let (mut expected, mut seen) = (0, 0);
         for star in bright {
             expected += 1;

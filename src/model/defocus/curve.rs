@@ -2,7 +2,8 @@
 //! error.
 
 use super::ErrorPoint;
-use nalgebra::{Matrix3, Vector3};
+use crate::base::least_squares::LinearFit;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 /// Number of steps in the search for the minimum.
@@ -95,20 +96,18 @@ impl ErrorCurve {
     /// Local parabola, in logarithms.
     fn fitted_at(&self, at: f64) -> f64 {
         let reach = self.reach_at(at);
-        let mut squared = Matrix3::zeros();
-        let mut right = Vector3::zeros();
+        let mut fit = LinearFit::new();
         for point in &self.points {
             let distance = (point.log_spot - at) / reach;
             if distance.abs() < 1.0 {
                 let weight = point.weight * (1.0 - distance.abs().powi(3)).powi(3);
                 let row = Vector3::new(1.0, distance, distance * distance);
-                squared += row * row.transpose() * weight;
-                right += row * (weight * point.log_rms);
+                fit.add(&row, weight, weight * point.log_rms);
             }
         }
         // At least four distinct radii count: the matrix can be inverted.
-        let solved = squared.cholesky().map(|c| c.solve(&right)[0]);
-        solved.unwrap_or_else(|| self.joined_at(at))
+        fit.solve()
+            .map_or_else(|| self.joined_at(at), |solved| solved[0])
     }
 
     /// Half width of the local regression, as a logarithm of the ratio of radii.

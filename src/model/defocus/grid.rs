@@ -1,5 +1,6 @@
 //! The grid of spot radii and noises, and the centroid errors on it.
 
+use crate::base::statistics::mean_and_squares;
 use crate::model::sensitivity::Spacing;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -54,9 +55,8 @@ impl ErrorPoint {
     /// From the squared distances of the detected stars.
     pub fn of_squares(trials: usize, squares_px2: &[f64]) -> Self {
         let count = squares_px2.len() as f64;
-        let mean = squares_px2.iter().sum::<f64>() / count;
-        let spread = squares_px2.iter().map(|square| (square - mean).powi(2));
-        let variance = spread.sum::<f64>() / (count - 1.0).max(1.0);
+        let (mean, spread) = mean_and_squares(squares_px2);
+        let variance = spread / (count - 1.0).max(1.0);
         let rms_px = mean.sqrt();
         Self {
             trials,

@@ -1,7 +1,7 @@
 //! Tests of the zero point.
 
 use super::*;
-use crate::base::statistics::Estimate;
+use crate::base::statistics::{Estimate, mean_and_squares};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -67,10 +67,8 @@ impl Stars {
 
 /// Mean and standard deviation.
 fn mean_and_spread(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
-    (mean, square.sqrt())
+    let (mean, squares) = mean_and_squares(values);
+    (mean, (squares / values.len() as f64).sqrt())
 }
 
 #[test]

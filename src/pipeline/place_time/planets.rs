@@ -6,7 +6,7 @@ use super::change::{Candidate, other_dates};
 use super::contradiction::Contradiction;
 use super::examination::Assessed;
 use crate::base::coords::{PixelPoint, UnitVector};
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::solar_system::{Body, BodyKind, TimeError, bodies_at};
 use crate::pipeline::bodies::mag;
@@ -100,16 +100,11 @@ fn strangers(assessed: &Assessed) -> Vec<Stranger> {
         .iter()
         .map(|named| named.source.get())
         .collect();
-    let mut zero_points: Vec<f64> = examination
-        .sky
-        .stars
-        .iter()
-        .filter_map(|star| Some(star.v_mag - mag(&sources[star.source.get()])?))
-        .collect();
-    if zero_points.is_empty() {
+    let stars = examination.sky.stars.iter();
+    let zero_points = stars.filter_map(|star| Some(star.v_mag - mag(&sources[star.source.get()])?));
+    let Some(zero_point) = median_of(zero_points) else {
         return Vec::new();
-    }
-    let zero_point = median(&mut zero_points);
+    };
     let unnamed = sources.iter().enumerate().filter(|(at, source)| {
         let is_starlike = source
             .measured

@@ -3,6 +3,7 @@
 use super::candidate::Candidate;
 use super::mixture::{CloudMix, Kind, StarErrors, clear_stars, errors_of, least_clear};
 use super::relation::{UNKNOWNS, Unknowns, experience};
+use crate::base::least_squares::LinearFit;
 use crate::base::statistics::Estimate;
 use nalgebra::SMatrix;
 
@@ -148,24 +149,26 @@ impl Fit {
         /// Least information of a star, over what it has if it is known to be clear.
         const LEAST: f64 = 0.1;
         let known = experience(is_flat);
-        let mut normal = Covariance::zeros();
-        let mut right = Unknowns::zeros();
+        let mut fit = LinearFit::new();
         for (unknown, Estimate { value, sigma }) in known.into_iter().enumerate() {
-            normal[(unknown, unknown)] += sigma.powi(-2);
-            right[unknown] += value * sigma.powi(-2);
+            fit.matrix[(unknown, unknown)] += sigma.powi(-2);
+            fit.vector[unknown] += value * sigma.powi(-2);
         }
-        let mut information = normal;
+        let mut information = fit.matrix;
         for (star, kind) in stars {
             let variance = errors.of(star.expected_sigma_mag(&before.unknowns)).powi(2);
             let square = star.row * star.row.transpose() * (kind.clear / variance);
-            normal += square;
-            right += star.row * (kind.clear * star.offset_mag / variance);
+            fit.add(
+                &star.row,
+                kind.clear / variance,
+                kind.clear * star.offset_mag / variance,
+            );
             // What is lost as it may be behind clouds (Louis 1982, J. R. Stat. Soc. B 44, 226).
             let lost = (1.0 - kind.clear) * star.residual_mag(&before.unknowns).powi(2) / variance;
             information += square * (1.0 - lost).max(LEAST);
         }
         Some(Self {
-            unknowns: normal.cholesky()?.solve(&right),
+            unknowns: fit.solve()?,
             covariance: information.cholesky()?.inverse(),
         })
     }

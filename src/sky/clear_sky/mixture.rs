@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::relation::Unknowns;
-use crate::base::statistics::{SIGMA_PER_MAD, median, normal_density};
+use crate::base::statistics::{SIGMA_PER_MAD, median, median_of, normal_density};
 
 /// Mean extinction of clouds, in magnitudes: thin ones are more frequent.
 const MEAN_CLOUD_MAG: f64 = 1.0;
@@ -144,14 +144,11 @@ pub(super) fn errors_of(
         let seen_mag = SIGMA_PER_MAD * star.residual_mag(unknowns);
         (seen_mag, star.expected_sigma_mag(unknowns))
     });
-    let median_of = |values: &mut Vec<f64>| (!values.is_empty()).then(|| median(values));
-    let mut ratios: Vec<f64> = pairs.clone().map(|(seen, stated)| seen / stated).collect();
-    let scale = median_of(&mut ratios).unwrap_or(1.0);
+    let ratios = pairs.clone().map(|(seen, stated)| seen / stated);
+    let scale = median_of(ratios).unwrap_or(1.0);
     let scale = if scale < LARGEST_SCALE { scale } else { 1.0 };
-    let mut excess: Vec<f64> = pairs
-        .map(|(seen, stated)| seen.powi(2) - (scale * stated).powi(2))
-        .collect();
-    let mut scatter_mag2 = median_of(&mut excess).unwrap_or(0.0);
+    let excess = pairs.map(|(seen, stated)| seen.powi(2) - (scale * stated).powi(2));
+    let mut scatter_mag2 = median_of(excess).unwrap_or(0.0);
     let apart = stars.iter().filter_map(|(star, _)| {
         let other = &candidates[star.neighbor?];
         let apart_mag =

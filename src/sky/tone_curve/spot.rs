@@ -4,7 +4,7 @@
 //! others. So that this does not make it likelier, all have the noise of the sum of levels: what is missing is added.
 
 use super::curve::ToneCurve;
-use crate::base::statistics::{SIGMA_PER_MAD, even_part, median, normal_quantile};
+use crate::base::statistics::{clip, even_part, mean_and_squares, median_of, normal_quantile};
 use crate::detect::Detections;
 use crate::frame::Frame;
 use crate::photometry::{MAG_PER_RELATIVE, Measured, instrumental_mag};
@@ -85,14 +85,15 @@ impl Spot {
         let is_whole = levels_adu
             .iter()
             .all(|level| *level < BRIGHTEST * white_adu);
-        clip(&mut around_adu);
-        let (sky_adu, variance_adu2) = mean_and_variance(&around_adu);
+        // The levels of other stars. Levels of a picture are whole numbers.
+        clip(&mut around_adu, 0.5);
+        let (sky_adu, squares_adu2) = mean_and_squares(&around_adu);
         (is_whole && !around_adu.is_empty()).then_some(Self {
             star: *star,
             levels_adu,
-            around_adu,
             sky_adu,
-            variance_adu2,
+            variance_adu2: squares_adu2 / around_adu.len() as f64,
+            around_adu,
             flux_per_light,
             expected_adu: flux / flux_per_light,
             deviate: 0.0,
@@ -109,11 +110,9 @@ impl Spot {
     /// Gives spots the light that is beyond their reach: what all lack of the fluxes that were fitted to them, in
     /// the median.
     pub fn add_light_beyond(spots: &mut [Self]) {
-        let mut caught: Vec<f64> = spots.iter().filter_map(Self::caught).collect();
-        if caught.is_empty() {
+        let Some(caught) = median_of(spots.iter().filter_map(Self::caught)) else {
             return;
-        }
-        let caught = median(&mut caught);
+        };
         for spot in spots {
             spot.flux_per_light /= caught;
         }
@@ -160,7 +159,8 @@ impl Spot {
     pub fn by(&self, curve: &ToneCurve) -> Option<LitSpot> {
         let count = self.levels_adu.len() as f64;
         let around: Vec<f64> = self.around_adu.iter().map(|at| curve.light(*at)).collect();
-        let (sky, variance) = mean_and_variance(&around);
+        let (sky, squares) = mean_and_squares(&around);
+        let variance = squares / around.len() as f64;
         let (mut light, mut flux_adu, mut response_adu) = (0.0, 0.0, 0.0);
         let mut noise2 = variance * count.powi(2) / around.len() as f64;
         for level_adu in &self.levels_adu {
@@ -189,25 +189,4 @@ impl Spot {
             ln_response: libm::log(response),
         })
     }
-}
-
-/// Leaves out the levels of other stars.
-fn clip(levels_adu: &mut Vec<f64>) {
-    const SIGMAS: f64 = 3.0;
-    /// Levels of a picture are whole numbers.
-    const LEAST_SIGMA_ADU: f64 = 0.5;
-    if levels_adu.is_empty() {
-        return;
-    }
-    let middle = median(&mut levels_adu.clone());
-    let mut apart: Vec<f64> = levels_adu.iter().map(|at| (at - middle).abs()).collect();
-    let reach = SIGMAS * (SIGMA_PER_MAD * median(&mut apart)).max(LEAST_SIGMA_ADU);
-    levels_adu.retain(|level| (level - middle).abs() <= reach);
-}
-
-fn mean_and_variance(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares = values.iter().map(|value| (value - mean).powi(2));
-    (mean, squares.sum::<f64>() / count)
 }

@@ -2,7 +2,7 @@
 
 use super::canvas::ClutterCanvas;
 use super::chance::{log_uniform, normal};
-use crate::base::statistics::SIGMA_PER_MAD;
+use crate::base::statistics::{SIGMA_PER_MAD, median};
 use crate::frame::{Frame, FrameError};
 use crate::model::simulate::{color, decoded_jpeg, demosaiced};
 use image::ExtendedColorType;
@@ -32,18 +32,13 @@ impl ClutterSky {
         let pairs = pixels.windows(2).step_by(STRIDE);
         let mut differences: Vec<f32> = pairs.map(|pair| (pair[1] - pair[0]).abs()).collect();
         let mut levels: Vec<f32> = pixels.iter().step_by(STRIDE).copied().collect();
-        let noise = NOISE_OF_DIFFERENCE * f64::from(middle(&mut differences));
+        let noise = NOISE_OF_DIFFERENCE * f64::from(median(&mut differences));
         Self {
-            level: f64::from(middle(&mut levels)),
+            level: f64::from(median(&mut levels)),
             // Integers: at least the noise of rounding.
             noise: noise.max(0.29),
         }
     }
-}
-
-fn middle(values: &mut [f32]) -> f32 {
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f32::total_cmp).1
 }
 
 /// `frame` behind `canvas`, which has the sky's noise.

@@ -2,6 +2,7 @@
 
 use super::simulated::{FrameResult, IdentifiedStars, SHIFT_PX, StarResult};
 use crate::base::format::to_decimals;
+use crate::base::statistics::mean_and_squares;
 use crate::model::sensitivity::{Detector, Faintest};
 use serde::Serialize;
 
@@ -111,8 +112,7 @@ impl SimulatedReport {
 impl FoundFaintest {
     fn of(vmags: &[f64], expected: Option<&ExpectedFaintest>) -> Option<Self> {
         let count = vmags.len() as f64;
-        let mean = vmags.iter().sum::<f64>() / count;
-        let squares = vmags.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+        let (mean, squares) = mean_and_squares(vmags);
         let sigma = (squares / (count - 1.0).max(1.0)).sqrt();
         // One frame has no scatter of its own; the expected one is used.
         let sigma_of_one = if vmags.len() > 1 {

@@ -3,6 +3,7 @@
 use super::centroids::SimulatedCentroids;
 use super::interval::Interval;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
+use crate::base::statistics::quantile;
 use crate::camera::CameraModel;
 use crate::identify::{Identification, StarMatch};
 use serde::{Deserialize, Serialize};
@@ -142,10 +143,6 @@ impl TrialResults {
     pub fn time_quantile_ms(&self, share: f64) -> f64 {
         let mut times: Vec<f64> = self.results.iter().map(|v| v.time_ms).collect();
         times.sort_unstable_by(f64::total_cmp);
-        let last = times.len().saturating_sub(1);
-        times
-            .get((share * last as f64).round() as usize)
-            .copied()
-            .unwrap_or(0.0)
+        quantile(&times, share).unwrap_or(0.0)
     }
 }

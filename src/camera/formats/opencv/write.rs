@@ -2,13 +2,12 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{
-    CHECK_POINTS, FIT_POINTS, Sample, largest_error_px, least_squares, samples,
-};
+use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, largest_error_px, samples};
 use super::super::yaml::{number, write_matrix};
 use super::{CvLens, CvModel};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Rotation};
+use crate::base::least_squares::levenberg_marquardt;
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::{LENS_TERMS, Projection};
 use nalgebra::{Matrix3, Vector3};
@@ -215,7 +214,7 @@ fn fit(start: &CvLens, count: usize, fitted: &[Sample]) -> Option<CvLens> {
     // Axes that may not turn have a parameter that nothing depends on.
     let free = usize::from(!is_pinhole) * 3;
     let steps = vec![1e-5; first.len() - free];
-    let found = least_squares(&first[free..], &steps, |parameters, residuals| {
+    let found = levenberg_marquardt(&first[free..], &steps, |parameters, residuals| {
         let parameters: Vec<f64> = first[..free].iter().chain(parameters).copied().collect();
         let (lens, turn) = lens_of(&parameters);
         fitted.iter().all(|sample| {

@@ -9,6 +9,7 @@ use super::plate::{Kind, Left, Warp};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
+use crate::base::least_squares::solve_pair;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::{Distortion, DistortionModel, Projection};
 use crate::ephemeris::observer::Site;
@@ -343,13 +344,12 @@ impl Plate {
                 [0, 1].map(|i: usize| (high[i] - low[i]) / (2.0 * STEP_PX))
             };
             let ([xx, yx], [xy, yy]) = (slope(0), slope(1));
-            let determinant = xx * yy - xy * yx;
+            let (step, determinant) = solve_pair([[xx, xy], [yx, yy]], off);
             // Beyond a fold nothing is imaged.
             if determinant.is_nan() || determinant <= 0.0 {
                 return None;
             }
-            at[0] -= (yy * off[0] - xy * off[1]) / determinant;
-            at[1] -= (xx * off[1] - yx * off[0]) / determinant;
+            at = [at[0] - step[0], at[1] - step[1]];
         }
         None
     }

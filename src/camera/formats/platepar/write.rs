@@ -2,12 +2,13 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, least_squares, samples};
+use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, samples};
 use super::super::pointing::Pointing;
 use super::super::sky::{Sky, sidereal_time_deg};
 use super::plate::{DEGREES, Kind, Warp};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
+use crate::base::least_squares::levenberg_marquardt;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use nalgebra::Vector3;
 use serde_json::{Map, Value, json};
@@ -282,7 +283,7 @@ fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2])
             .copied()
             .collect::<Vec<f64>>()
     };
-    let found = least_squares(&first[of_scale..], &steps, |parameters, residuals| {
+    let found = levenberg_marquardt(&first[of_scale..], &steps, |parameters, residuals| {
         let parameters = complete(parameters);
         let (warp, scale) = (free.warp(&parameters[1..]), scale_px_deg * parameters[0]);
         for point in fitted {
@@ -296,7 +297,7 @@ fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2])
     let reverse = free.warp(&found[1..]);
     let start = free.start(axis_px.map(|px| -px), axis_px);
     let steps = vec![1e-5; start.len()];
-    let found = least_squares(&start, &steps, |parameters, residuals| {
+    let found = levenberg_marquardt(&start, &steps, |parameters, residuals| {
         let warp = free.warp(parameters);
         for point in fitted {
             let ([x, y], [to_x, to_y]) = (warp.forward(point.pixel), scaled(point, scale_px_deg));

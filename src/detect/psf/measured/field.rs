@@ -1,6 +1,7 @@
 //! Size and elongation of the spots over the field: the simplest polynomial that the stars allow.
 
 use super::stars::PsfStar;
+use crate::base::least_squares::huber_weight;
 use crate::detect::psf::{FIELD_TERMS, FieldFrame, FieldMoments, polynomials};
 use arrayvec::ArrayVec;
 use nalgebra::{DMatrix, DVector, SVector};
@@ -149,8 +150,6 @@ impl FieldFit {
     fn of(samples: &[Sample], model: &[Basis]) -> Option<Self> {
         /// Rounds of weights.
         const ROUNDS: usize = 4;
-        /// Residuals beyond this many standard deviations count less.
-        const HUBER_SIGMA: f64 = 2.5;
         let mut weights: Vec<Moments> = samples
             .iter()
             .map(|s| s.variances.map(f64::recip))
@@ -188,7 +187,7 @@ impl FieldFit {
                 let residual = sample.values - sample.predicted(&fit.coefficients);
                 for i in 0..3 {
                     let sigmas = residual[i].abs() / sample.variances[i].sqrt();
-                    let part = (HUBER_SIGMA / sigmas).min(1.0);
+                    let part = huber_weight(sigmas);
                     weight[i] = part / sample.variances[i];
                     fit.chi2 += part * sigmas * sigmas;
                 }

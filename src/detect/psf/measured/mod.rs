@@ -12,7 +12,7 @@ mod field;
 mod lobe_shares;
 mod stars;
 
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{FitBuffers, FrameMaps, NoiseModel, SpotEstimate, Window};
 use crate::detect::psf::{
@@ -255,16 +255,14 @@ fn radius_px(maps: &FrameMaps<'_>) -> usize {
 
 /// The median of each of the stars' moments.
 fn typical_moments(stars: &[PsfStar]) -> SpotMoments {
-    std::array::from_fn(|i| {
-        let mut values: Vec<f64> = stars.iter().map(|star| star.moments[i]).collect();
-        median(&mut values)
-    })
+    let of_moment = |i: usize| median_of(stars.iter().map(|star| star.moments[i]));
+    std::array::from_fn(|i| of_moment(i).unwrap_or(0.0))
 }
 
 /// The light in the brightest pixel of the median star, in ADU.
 fn typical_light(stars: &[PsfStar], maps: &FrameMaps<'_>) -> f64 {
-    let mut fluxes: Vec<f64> = stars.iter().map(|star| star.spot.flux).collect();
-    median(&mut fluxes) * maps.matched_gain
+    let flux = median_of(stars.iter().map(|star| star.spot.flux));
+    flux.unwrap_or(0.0) * maps.matched_gain
 }
 
 /// The noise model of the stars, each compared with the PSF from the other half of them.

@@ -1,7 +1,7 @@
 //! The bright stars that tell the PSF, fitted with a size and an elongation of their own.
 
 use crate::base::size::Size;
-use crate::base::statistics::median;
+use crate::base::statistics::median_of;
 use crate::detect::candidates::Peak;
 use crate::detect::fit::{
     FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels, sum_of,
@@ -495,15 +495,8 @@ fn keep_alike(stars: &mut Vec<PsfStar>) {
     const SIZE_FACTOR: f64 = 2.0;
     /// Largest chi² over that of the median star.
     const CHI2_FACTOR: f64 = 8.0;
-    let median_of = |value: &dyn Fn(&PsfStar) -> f64| {
-        let mut values: Vec<f64> = stars.iter().map(value).collect();
-        median(&mut values)
-    };
-    if stars.is_empty() {
-        return;
-    }
-    let size = median_of(&|star| star.moments[0]);
-    let chi2 = median_of(&|star| star.chi2);
+    let size = median_of(stars.iter().map(|star| star.moments[0])).unwrap_or(0.0);
+    let chi2 = median_of(stars.iter().map(|star| star.chi2)).unwrap_or(0.0);
     stars.retain(|star| {
         let is_alike = (star.moments[0] - size).abs() < libm::log(SIZE_FACTOR);
         is_alike && star.chi2 < CHI2_FACTOR * chi2.max(1.0)

@@ -6,6 +6,7 @@ use super::light::Template;
 use super::mean::{for_each_trail, measure_template};
 use super::profile::{Profile, Strip};
 use super::shape::Shape;
+use crate::base::statistics::{median, median_of};
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::StarTrails;
 use crate::detect::fit::FrameMaps;
@@ -61,7 +62,7 @@ impl Trails {
         let lengths = aligned.iter().map(|large| length_px(large.region));
         let shape = Shape {
             direction,
-            length_px: middle_of(lengths)?,
+            length_px: median_of(lengths)?,
             half_breadth_px: 2.0 * maps.width_px(),
         };
         let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
@@ -163,15 +164,8 @@ fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shap
     for_each_trail(maps, regions, shape, None, |profile, _| {
         slopes.push(profile.slope(0.5 * shape.length_px));
     });
-    let slope = middle_of(slopes.into_iter());
-    slope.filter(|slope| slope.is_finite()).unwrap_or(0.0)
-}
-
-/// The median of values of the regions; of an even number the upper one in the middle.
-fn middle_of(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: ArrayVec<f64, MAX> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let slope = median(&mut slopes);
+    if slope.is_finite() { slope } else { 0.0 }
 }
 
 /// Number of rows of regions, each of which goes on where the one before it ends: the pieces of one trail.
@@ -223,7 +217,7 @@ fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
         .map(|large| large.region.y * cos - large.region.x * sin);
     let mut across: ArrayVec<f64, MAX> = across.collect();
     across.sort_unstable_by(f64::total_cmp);
-    let breadth_px = middle_of(regions.iter().map(|large| large.region.minor_px));
+    let breadth_px = median_of(regions.iter().map(|large| large.region.minor_px));
     let apart_px = 3.0 * breadth_px.unwrap_or(0.0);
     let gaps = across
         .windows(2)

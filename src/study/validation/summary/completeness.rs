@@ -1,6 +1,7 @@
 //! Measured and predicted completeness by magnitude.
 
 use crate::base::format::{to_decimals, to_significant};
+use crate::base::least_squares::solve_pair;
 use crate::base::statistics::{Estimate, normal_cdf, normal_density};
 use crate::study::robustness::Interval;
 use crate::study::validation::record::BEYOND_LIMIT_MAG;
@@ -168,12 +169,10 @@ fn fitted_limit(
             slope[1] += weight * by_b * (part(bin) - p);
         }
         let [aa, ab, bb] = information;
-        let determinant = aa * bb - ab * ab;
+        let ([step_a, step_b], determinant) = solve_pair([[aa, ab], [ab, bb]], slope);
         if determinant.is_nan() || determinant <= 0.0 {
             return None;
         }
-        let step_a = (bb * slope[0] - ab * slope[1]) / determinant;
-        let step_b = (aa * slope[1] - ab * slope[0]) / determinant;
         // A step that would change the sign of b is shortened.
         let shorter = (0.5 * b / step_b.abs()).min(1.0);
         a += shorter * step_a;

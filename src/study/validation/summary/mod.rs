@@ -16,6 +16,7 @@ pub use pulls::{DifferenceSummary, Histogram, Pull, PullSummary};
 
 use super::record::{FrameRecord, RowKind, StarRecord};
 use crate::base::format::{to_decimals, to_significant};
+use crate::base::statistics::quantile;
 use crate::study::robustness::{Answer, Interval};
 use centroids::Centroids;
 use completeness::Completeness;
@@ -152,25 +153,21 @@ pub struct Quantiles {
 impl Quantiles {
     /// Quantiles of `sorted` values; none if there are none.
     fn of(sorted: &[f64]) -> Option<Self> {
-        (!sorted.is_empty()).then(|| Self {
-            p50: quantile(sorted, 0.5),
-            p68: quantile(sorted, 0.683),
-            p95: quantile(sorted, 0.95),
-            p99: quantile(sorted, 0.99),
-            max: quantile(sorted, 1.0),
+        let at = |share: f64| Some(to_significant(quantile(sorted, share)?, 6));
+        Some(Self {
+            p50: at(0.5)?,
+            p68: at(0.683)?,
+            p95: at(0.95)?,
+            p99: at(0.99)?,
+            max: at(1.0)?,
         })
     }
 }
 
-/// Quantile of `sorted` values, of which there is at least one.
-fn quantile(sorted: &[f64], part: f64) -> f64 {
-    let place = part * (sorted.len() - 1) as f64;
-    to_significant(sorted[place.round() as usize], 6)
-}
-
 fn percentiles(sorted: &[f64]) -> Vec<f64> {
     let percentile = |percent: u32| quantile(sorted, f64::from(percent) / 100.0);
-    (0..=100).map(percentile).collect()
+    let percentiles = (0..=100).filter_map(percentile);
+    percentiles.map(|value| to_significant(value, 6)).collect()
 }
 
 /// Accumulates rows one at a time.
