@@ -36,7 +36,7 @@ mod validator;
 
 pub use light::LightMap;
 pub use parameter_study::{StudyParameter, StudyRow};
-pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
+pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord, TableRow};
 pub use suite::{HARD_SUITE, HardCase, HardRow};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,
