@@ -7,6 +7,8 @@ use crate::model::sensitivity::Scenario;
 use crate::study::robustness::{Answer, Interval};
 use serde::Serialize;
 
+const HEADING: &str = "                  frames   right  wrong  detected  false/Mpx asked for    named   wrong            95 %   stated\n";
+
 /// The results of all frames of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KindResult {
@@ -82,20 +84,7 @@ impl KindResult {
 
     /// The rows as text, with sums over the frames with and without sky.
     pub fn to_text(rows: &[Self]) -> String {
-        let mut text = format!(
-            "{:<16} {:>7} {:>7} {:>6} {:>9} {:>10} {:>9} {:>8} {:>7} {:>15} {:>8}\n",
-            "",
-            "frames",
-            "right",
-            "wrong",
-            "detected",
-            "false/Mpx",
-            "asked for",
-            "named",
-            "wrong",
-            "95 %",
-            "stated"
-        );
+        let mut text = HEADING.to_owned();
         for row in rows {
             text += &row.line();
         }

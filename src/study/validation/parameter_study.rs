@@ -7,7 +7,6 @@ use crate::camera::focal_length_px;
 use crate::model::sensitivity::{Spacing, UnknownParameter};
 use crate::model::simulate::{Setup, SetupParameter};
 use serde::Serialize;
-use std::fmt::Write as _;
 
 /// What a study varies.
 #[derive(Debug, Clone, Copy)]
@@ -195,7 +194,7 @@ impl StudyRow {
     pub fn to_text(rows: &[Self]) -> String {
         let mut text = String::new();
         for rows in rows.chunk_by(|a, b| a.parameter == b.parameter) {
-            text += &heading(rows[0].parameter);
+            text += &format!("{:>26}{HEADING}", rows[0].parameter);
             for row in rows {
                 text += &row.line();
             }
@@ -229,63 +228,10 @@ impl StudyRow {
     }
 }
 
-fn heading(parameter: &str) -> String {
-    let lines = [
-        [
-            parameter,
-            "frames",
-            "right",
-            "none",
-            "wrong",
-            "right %",
-            "95 %",
-            "limit",
-            "minus",
-            "ratio to",
-            "boresight",
-            "95 %",
-            "NEES",
-        ],
-        [
-            "",
-            "",
-            "",
-            "",
-            "",
-            "",
-            "",
-            "V",
-            "expected",
-            "bound",
-            "off ″, 50",
-            "",
-            "of 3",
-        ],
-    ];
-    let mut text = String::new();
-    for [
-        name,
-        frames,
-        right,
-        none,
-        wrong,
-        rate,
-        interval,
-        limit,
-        off,
-        ratio,
-        p50,
-        p95,
-        nees,
-    ] in lines
-    {
-        let _ = writeln!(
-            text,
-            "{name:>26} {frames:>7} {right:>7} {none:>6} {wrong:>6} {rate:>8} {interval:>19} {limit:>8} {off:>8} {ratio:>9} {p50:>9} {p95:>7} {nees:>7}"
-        );
-    }
-    text
-}
+/// The heading of the rows, after the name of the parameter.
+const HEADING: &str = "  frames   right   none  wrong  right %                95 %    limit    minus  ratio to boresight    95 %    NEES
+                                                                                             V expected     bound off ″, 50            of 3
+";
 
 #[cfg(test)]
 mod tests {

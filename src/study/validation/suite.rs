@@ -8,7 +8,6 @@ use crate::camera::data_sheet::SpotForm;
 use crate::ephemeris::observer::Site;
 use crate::model::simulate::{Setup, camera_of};
 use serde::Serialize;
-use std::fmt::Write as _;
 
 /// A case of the suite.
 #[derive(Debug, Clone, Copy)]
@@ -209,6 +208,11 @@ fn lens(setup: &mut Setup, thousandths: [f64; LENS_TERMS]) {
     ] = thousandths.map(|displacement| displacement * unit_px);
 }
 
+const HEADING: &str = "Mean and standard deviation of errors over stated errors, 0 and 1 where these are true; NEES 3.
+
+                 frames  right  wrong   NEES     x     y           flux   focal length     zero point   limit  split  notes
+";
+
 /// The results of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HardRow {
@@ -291,23 +295,7 @@ impl HardRow {
 
     /// `rows` as a table in text.
     pub fn to_text(rows: &[Self]) -> String {
-        let mut text = "Mean and standard deviation of errors over stated errors, 0 and 1 where these are true; NEES 3.\n\n".to_owned();
-        let _ = writeln!(
-            text,
-            "{:<16} {:>6} {:>6} {:>6} {:>6} {:>5} {:>5} {:>14} {:>14} {:>14} {:>7} {:>6}  notes",
-            "",
-            "frames",
-            "right",
-            "wrong",
-            "NEES",
-            "x",
-            "y",
-            "flux",
-            "focal length",
-            "zero point",
-            "limit",
-            "split"
-        );
+        let mut text = HEADING.to_owned();
         for row in rows {
             text += &row.line();
         }
