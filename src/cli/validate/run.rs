@@ -11,10 +11,11 @@ use crate::cli::output::rows::json_indented;
 use crate::cli::plot::figure_files;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
+use starpipe::study::StudyError;
 use starpipe::study::validation::store::{
     FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
-use starpipe::study::validation::{Protocol, Summary, ValidationError, Validator};
+use starpipe::study::validation::{Protocol, Summary, Validator};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -48,9 +49,7 @@ pub(super) fn run(
     shared: &Shared,
 ) -> Result<Run, CommandError> {
     let validator = Validator::new(shared.indexed, protocol).map_err(|error| match error {
-        ValidationError::Scenario(_) | ValidationError::NoLimit => {
-            CommandError::Usage(error.to_string())
-        }
+        StudyError::Scenario(_) | StudyError::NoLimit => CommandError::usage(error),
         other => CommandError::Failed(other.into()),
     })?;
     claim_directory(directory, protocol, shared.indexed.catalog()).map_err(claim_error)?;

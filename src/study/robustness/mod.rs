@@ -36,9 +36,8 @@ pub use trial::{Answer, TrialResult, TrialResults};
 
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::{IndexedCatalog, identify};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
+use crate::pipeline::Workspace;
+use crate::study::trials::{self, random_of};
 use std::time::Instant;
 
 /// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after
@@ -50,15 +49,8 @@ pub fn run(
     seed: u64,
     done: &(dyn Fn() + Sync),
 ) -> TrialResults {
-    let results: Vec<TrialResult> = (0..trials)
-        .into_par_iter()
-        .map(|trial| {
-            let result = run_one(indexed, protocol, seed, trial);
-            done();
-            result
-        })
-        .collect();
-    TrialResults::new(results)
+    let trial = |trial: u64, _: &mut Workspace| run_one(indexed, protocol, seed, trial);
+    TrialResults::new(trials::run(trials, done, trial))
 }
 
 /// Runs only the trial number `trial`.
@@ -68,8 +60,7 @@ pub fn run_one(
     seed: u64,
     trial: u64,
 ) -> TrialResult {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(trial);
+    let mut rng = random_of(seed, trial);
     let centroids = SimulatedCentroids::draw(protocol, indexed, &mut rng);
     let priors = protocol.priors(&mut rng);
     let start = Instant::now();
