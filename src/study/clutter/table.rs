@@ -4,7 +4,7 @@ use super::evaluation::FrameResult;
 use super::kind::Kind;
 use crate::base::format::{to_decimals, to_significant};
 use crate::model::sensitivity::Scenario;
-use crate::study::robustness::{Answer, Interval};
+use crate::study::robustness::{Answers, Interval};
 use serde::Serialize;
 
 const HEADING: &str = "                  frames   right  wrong  detected  false/Mpx asked for    named   wrong            95 %   stated\n";
@@ -49,12 +49,7 @@ pub struct KindResult {
 impl KindResult {
     /// The results of the frames of a kind in a study of `scenario`.
     pub fn new(kind: Kind, results: &[FrameResult], scenario: &Scenario) -> Self {
-        let count = |answer| {
-            results
-                .iter()
-                .filter(|result| result.answer == answer)
-                .count()
-        };
+        let answers: Answers = results.iter().map(|result| result.answer).collect();
         let sum = |of: fn(&FrameResult) -> usize| results.iter().map(of).sum::<usize>();
         let megapixels: f64 = results.iter().map(|result| result.megapixels).sum();
         let (named, misnamed) = (sum(|r| r.named), sum(|r| r.misnamed));
@@ -67,9 +62,9 @@ impl KindResult {
             kind,
             is_sky: kind.is_sky(),
             frames: results.len(),
-            right: count(Answer::Right),
-            wrong: count(Answer::Wrong),
-            wrong_high_percent: percent(Interval::of(count(Answer::Wrong), results.len()).high),
+            right: answers.right,
+            wrong: answers.wrong,
+            wrong_high_percent: percent(answers.wrong_interval().high),
             detected: sum(|r| r.detected),
             false_detections,
             false_per_mpx: to_significant(false_detections as f64 / megapixels, 4),
@@ -142,6 +137,7 @@ fn names(named: usize, misnamed: usize, stated: f64) -> String {
 mod tests {
     use super::*;
     use crate::camera::data_sheet::Preset;
+    use crate::study::robustness::Answer;
 
     fn result(answer: Answer, named: usize, misnamed: usize) -> FrameResult {
         FrameResult {

@@ -3,7 +3,7 @@
 use super::trial::{CellRow, FrameRow, SkyTrial};
 use crate::base::format::{to_decimals, to_significant};
 use crate::sky::CLEAR_MAG;
-use crate::study::robustness::Answer;
+use crate::study::robustness::Answers;
 use serde::Serialize;
 
 /// Cells with a mean extinction above this are behind clouds,
@@ -184,6 +184,7 @@ impl GroupRow {
         let frames = || trials.iter().map(|trial| &trial.frame);
         let cells = || trials.iter().flat_map(|trial| &trial.cells);
         let count = |holds: Belongs| frames().filter(|row| holds(row)).count();
+        let answers: Answers = frames().map(|row| row.status).collect();
         let zenith = Errors::of(frames().map(|row| {
             let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
             Some((error, row.zenith_sigma_mag?))
@@ -204,8 +205,8 @@ impl GroupRow {
         Self {
             group,
             frames: trials.len(),
-            right: count(|row| row.status == Answer::Right),
-            wrong: count(|row| row.status == Answer::Wrong),
+            right: answers.right,
+            wrong: answers.wrong,
             measured: count(|row| row.measured),
             without_brightness: count(|row| row.no_brightness.is_some()),
             zenith_mean_mag: zenith.mean(),

@@ -20,12 +20,14 @@
 //! Rijlaarsdam, Yous, Byrne, Oddenino, Furano, Moloney 2020, Sensors 20, 2579 (what to report and
 //! to state with it).
 
+mod answers;
 mod centroids;
 mod interval;
 mod protocol;
 mod table;
 mod trial;
 
+pub use answers::Answers;
 pub use centroids::{SimulatedCentroids, random_rotation};
 pub use interval::{CONFIDENCE, Interval};
 pub use protocol::{Mirrored, Protocol};

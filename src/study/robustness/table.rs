@@ -1,7 +1,7 @@
 //! The standard table, sweeps over one parameter, and their results.
 
 use super::protocol::{Mirrored, Protocol};
-use super::trial::{Answer, TrialResults};
+use super::trial::TrialResults;
 use crate::identify::Photometry;
 use serde::Serialize;
 
@@ -188,8 +188,8 @@ impl CaseResult {
     /// in the rates.
     pub fn new(case: &Case, all: &TrialResults, least_true_stars: usize) -> Self {
         let counted = all.with_true_stars(least_true_stars);
-        let right = counted.interval(Answer::Right);
-        let rate = counted.count(Answer::Right) as f64 / counted.trials().max(1) as f64;
+        let (answers, of_all) = (counted.answers(), all.answers());
+        let right = answers.right_interval();
         let (named, misnamed) = counted.names();
         let protocol = &case.protocol;
         Self {
@@ -207,14 +207,14 @@ impl CaseResult {
             least_true_stars,
             trials: all.trials(),
             counted: counted.trials(),
-            right: counted.count(Answer::Right),
-            wrong: counted.count(Answer::Wrong),
-            no_answer: counted.count(Answer::None),
-            right_percent: percent(rate),
+            right: answers.right,
+            wrong: answers.wrong,
+            no_answer: answers.none,
+            right_percent: percent(answers.right_share()),
             right_low_percent: percent(right.low),
             right_high_percent: percent(right.high),
-            wrong_of_all: all.count(Answer::Wrong),
-            wrong_high_percent: percent(all.interval(Answer::Wrong).high),
+            wrong_of_all: of_all.wrong,
+            wrong_high_percent: percent(of_all.wrong_interval().high),
             named,
             misnamed,
             median_ms: milliseconds(all.time_quantile_ms(0.5)),
