@@ -53,14 +53,6 @@ impl ExperimentReport {
         let all = |simulated: &SimulatedReport| simulated.frames_identified == simulated.frames;
         self.simulated.as_ref().is_some_and(all)
     }
-
-    /// The report as one line of JSON, without the line's end.
-    ///
-    /// # Errors
-    /// [`serde_json::Error`], which does not occur with these types.
-    pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self)
-    }
 }
 
 impl LimitReport {

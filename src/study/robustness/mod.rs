@@ -29,11 +29,9 @@ mod trial;
 
 pub use answers::Answers;
 pub use centroids::{SimulatedCentroids, random_rotation};
-pub use interval::{CONFIDENCE, Interval};
+pub use interval::Interval;
 pub use protocol::{Mirrored, Protocol};
-pub use table::{
-    Case, CaseResult, STANDARD_FOV_DEG, VARIED_FOV_DEG, VariedParameter, standard_cases,
-};
+pub use table::{Case, CaseResult, VariedParameter, standard_cases};
 pub use trial::{Answer, TrialResult, TrialResults};
 
 use crate::ephemeris::places::StarPlaces;

@@ -6,9 +6,9 @@ use crate::identify::Photometry;
 use serde::Serialize;
 
 /// Fields of view of the standard table, in degrees.
-pub const STANDARD_FOV_DEG: [f64; 5] = [2.5, 5.0, 10.0, 20.0, 40.0];
+const STANDARD_FOV_DEG: [f64; 5] = [2.5, 5.0, 10.0, 20.0, 40.0];
 /// The field of view at which the standard table varies other parameters, in degrees.
-pub const VARIED_FOV_DEG: f64 = 10.0;
+const VARIED_FOV_DEG: f64 = 10.0;
 
 /// A protocol with its label in a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,8 +125,7 @@ impl VariedParameter {
     }
 }
 
-/// The result of a case: one row of the table. Rates are in percent; intervals have
-/// [`CONFIDENCE`](super::CONFIDENCE).
+/// The result of a case: one row of the table. Rates are in percent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CaseResult {
     /// Label of the case.

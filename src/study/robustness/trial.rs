@@ -104,11 +104,6 @@ impl TrialResults {
         Self { results }
     }
 
-    /// The results, by the number of the trial.
-    pub fn results(&self) -> &[TrialResult] {
-        &self.results
-    }
-
     /// The trials with at least `min` true stars.
     #[must_use]
     pub fn with_true_stars(&self, min: usize) -> Self {
