@@ -11,38 +11,23 @@ const HEADING: &str = "                  frames   right  wrong  detected  false/
 
 /// The results of all frames of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct KindResult {
-    /// The camera's name.
     pub camera: String,
-    /// The kind.
     pub kind: Kind,
-    /// Whether it shows the sky. Where it does not, every identification is wrong.
     pub is_sky: bool,
-    /// Number of frames.
     pub frames: usize,
-    /// Frames that were identified rightly.
     pub right: usize,
-    /// Frames that were identified wrongly.
     pub wrong: usize,
-    /// Upper end of the 95 % interval of the rate of wrong pointings.
     pub wrong_high_percent: f64,
-    /// Detections that may be stars.
     pub detected: usize,
-    /// Detections that may be stars where none is: clutter, or noise.
     pub false_detections: usize,
-    /// The same, in a million pixels.
     pub false_per_mpx: f64,
-    /// The number of false detections from noise alone that was asked for.
     pub asked_per_mpx: f64,
-    /// Detections with a name, in all identified frames.
     pub named: usize,
-    /// Detections with a wrong name: that star is not there.
     pub misnamed: usize,
-    /// Lower end of the 95 % interval of the share of wrong names.
     pub misnamed_low_percent: f64,
-    /// Upper end of it.
     pub misnamed_high_percent: f64,
-    /// The number of wrong names that the stated probabilities add up to.
     pub stated_misnamed: f64,
 }
 

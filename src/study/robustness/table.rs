@@ -127,58 +127,33 @@ impl VariedParameter {
 
 /// The result of a case: one row of the table. Rates are in percent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CaseResult {
-    /// Label of the case.
     pub case: String,
-    /// See [`Protocol::fov_deg`].
     pub fov_deg: f64,
-    /// See [`Protocol::mean_stars`].
     pub mean_stars: f64,
-    /// See [`Protocol::centroid_sigma_px`].
     pub centroid_error_px: f64,
-    /// See [`Protocol::mag_sigma`].
     pub mag_error: f64,
-    /// See [`Protocol::missing`].
     pub missing_percent: f64,
-    /// See [`Protocol::false_stars`].
     pub false_percent: f64,
-    /// See [`Protocol::bright_false_stars`].
     pub bright_false_stars: usize,
-    /// See [`Protocol::scale_error`].
     pub scale_error_percent: Option<f64>,
-    /// See [`Protocol::mirrored`].
     pub mirrored: Mirrored,
-    /// Whether the magnitudes are Johnson V (else fluxes).
     pub johnson_v: bool,
-    /// Minimum number of true stars of a trial that counts in the rates.
     pub least_true_stars: usize,
-    /// Number of trials.
     pub trials: usize,
-    /// Number of trials with enough true stars; the following fields count only these.
     pub counted: usize,
-    /// Identified correctly.
     pub right: usize,
-    /// Identified wrongly.
     pub wrong: usize,
-    /// Not identified.
     pub no_answer: usize,
-    /// Rate of right answers.
     pub right_percent: f64,
-    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// Number of wrong answers in all trials, whatever the number of stars.
     pub wrong_of_all: usize,
-    /// Upper end of the interval of the rate of wrong answers in all trials.
     pub wrong_high_percent: f64,
-    /// Number of identified centroids.
     pub named: usize,
-    /// Number of wrongly identified centroids.
     pub misnamed: usize,
-    /// Median identification time over all trials, in milliseconds.
     pub median_ms: f64,
-    /// 99th percentile of the identification time, in milliseconds.
     pub p99_ms: f64,
 }
 

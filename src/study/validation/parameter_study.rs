@@ -64,74 +64,41 @@ impl StudyParameter {
 
 /// The results of a run at one value of the parameter.
 #[derive(Debug, Clone, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct StudyRow {
-    /// Name of the parameter.
     pub parameter: &'static str,
-    /// Its value.
     pub value: f64,
-    /// Frames.
     pub frames: usize,
-    /// Frames identified correctly.
     pub right: usize,
-    /// Frames without an answer.
     pub none: usize,
-    /// Frames identified wrongly.
     pub wrong: usize,
-    /// Rate of correct answers.
     pub right_percent: f64,
-    /// Lower end of its 95 % interval.
     pub right_low_percent: f64,
-    /// Upper end of its 95 % interval.
     pub right_high_percent: f64,
-    /// Upper end of the 95 % interval of the rate of wrong answers.
     pub wrong_high_percent: f64,
-    /// Detections that may be stars.
     pub detected: u64,
-    /// Detections that were named.
     pub named: u64,
-    /// Detections with a wrong name.
     pub misnamed: u64,
-    /// Those of them that were named as another star at the same place.
     pub misnamed_companions: u64,
-    /// False detections in a million pixels.
     pub false_per_mpx: f64,
-    /// Lower end of its 95 % interval.
     pub false_low_per_mpx: f64,
-    /// Upper end of its 95 % interval.
     pub false_high_per_mpx: f64,
-    /// V magnitude at which half of the stars should be detected.
     pub predicted_limit_vmag: f64,
-    /// V magnitude at which half of the stars are detected.
     pub measured_limit_vmag: Option<f64>,
-    /// Its standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// Measured minus predicted limit.
     pub limit_difference_mag: Option<f64>,
-    /// Root mean square of the errors of centroids over their Cramér-Rao bound.
     pub centroid_ratio: Option<f64>,
-    /// Its standard error.
     pub centroid_ratio_sigma: Option<f64>,
-    /// Median error of the boresight.
     pub boresight_p50_arcsec: Option<f64>,
-    /// Its 95th percentile.
     pub boresight_p95_arcsec: Option<f64>,
-    /// Median error of the roll.
     pub roll_p50_arcsec: Option<f64>,
-    /// Its 95th percentile.
     pub roll_p95_arcsec: Option<f64>,
-    /// Mean of the squared error of the attitude in units of its covariance; 3 if that is correct.
     pub nees_mean: Option<f64>,
-    /// Its standard error.
     pub nees_sigma: Option<f64>,
-    /// Standard deviation of the errors of x over their stated errors.
     pub pull_x_sd: f64,
-    /// The same of y.
     pub pull_y_sd: f64,
-    /// The same of the light.
     pub pull_flux_sd: f64,
-    /// Mean of the faintest star named minus the faintest expected.
     pub faintest_difference_mag: f64,
-    /// Its standard error.
     pub faintest_difference_sigma_mag: f64,
     /// Title of an axis of the parameter.
     #[serde(skip)]

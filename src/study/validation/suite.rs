@@ -180,48 +180,28 @@ const HEADING: &str = "Mean and standard deviation of errors over stated errors,
 
 /// The results of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct HardRow {
-    /// Name of the case.
     pub case: &'static str,
-    /// What is hard about it.
     pub what: &'static str,
-    /// Frames.
     pub frames: usize,
-    /// Frames identified correctly.
     pub right: usize,
-    /// Frames identified wrongly.
     pub wrong: usize,
-    /// Mean of the squared error of the attitude in units of its covariance; 3 if that is correct.
     pub nees_mean: Option<f64>,
-    /// Standard error of that mean if the covariance is correct.
     pub nees_sigma: Option<f64>,
-    /// Standard deviation of the errors of x over their stated errors.
     pub pull_x_sd: f64,
-    /// The same of y.
     pub pull_y_sd: f64,
-    /// Mean of the errors of the flux over their stated errors.
     pub pull_flux_mean: f64,
-    /// Their standard deviation.
     pub pull_flux_sd: f64,
-    /// Mean of the errors of the focal length over their stated errors.
     pub pull_focal_length_mean: f64,
-    /// Their standard deviation.
     pub pull_focal_length_sd: f64,
-    /// Mean of the errors of the zero point over their stated errors.
     pub pull_zero_point_mean: f64,
-    /// Their standard deviation.
     pub pull_zero_point_sd: f64,
-    /// Mean of the measured minus the true zero point.
     pub zero_point_difference_mag: f64,
-    /// Measured minus predicted limit.
     pub limit_difference_mag: Option<f64>,
-    /// Stars that were detected as several.
     pub split: u64,
-    /// Detections with a wrong name.
     pub misnamed: u64,
-    /// False detections per million pixels.
     pub false_per_mpx: f64,
-    /// Codes of notes, each with the number of frames that have it.
     pub notes: String,
 }
 

@@ -20,26 +20,17 @@ pub struct IdentificationSummary {
 
 /// Frames by number of stars.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct IdentificationBin {
-    /// Lower end of the number of stars brighter than the predicted limit.
     pub from_stars: u64,
-    /// Upper end, inclusive.
     pub to_stars: u64,
-    /// Number of frames.
     pub frames: usize,
-    /// Correctly identified frames.
     pub right: usize,
-    /// Wrongly identified frames.
     pub wrong: usize,
-    /// Frames without identification.
     pub none: usize,
-    /// Percentage of right answers.
     pub right_percent: f64,
-    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// Upper end of the interval of wrong answers.
     pub wrong_high_percent: f64,
 }
 
