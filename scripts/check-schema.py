@@ -79,9 +79,9 @@ track: track OUT/still OUT/night fixtures/regression/no-stars.tif
 limit: limit --preset experiment-1
 limit: limit --camera {CAMERA} --sweep exposure_s=0.1:1:2
 experiment: experiment 1 --count 2
-robustness: robustness --count 2 --sweep centroid-error=0:1:2
-robustness: robustness --count 2 --sweep centroid-error=0:1:2 --scale-unknown
-clutter: clutter --camera {CAMERA} --kinds clean,noise --count 1
+robustness: validate --suite robustness --count 2 --sweep centroid-error=0:1:2
+robustness: validate --suite robustness --count 2 --sweep centroid-error=0:1:2 --scale-unknown
+clutter: validate --suite clutter --camera {CAMERA} --kinds clean,noise --count 1
 validate: validate --camera {CAMERA} --count 2 --figures none --out OUT/validation
 validate: validate --camera {CAMERA} --count 1 --exposure 0.0005 --figures none --out OUT/nothing
 validate_sweep: validate --camera {CAMERA} --count 1 --sweep exposure_s=0.0005:0.1:2 --figures none --out OUT/study

@@ -58,6 +58,25 @@ pub(crate) fn for_each_ordered<T: Sync, S, R: Send>(
     });
 }
 
+/// As [`for_each_ordered`], until `take` fails.
+pub(crate) fn try_for_each_ordered<T: Sync, S, R: Send>(
+    pool: &rayon::ThreadPool,
+    items: &[T],
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&T, &mut S) -> R + Sync,
+    mut take: impl FnMut(&T, R) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let mut taken = Ok(());
+    for_each_ordered(pool, items, state, work, |item, result| {
+        taken = take(item, result);
+        match taken {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
+    });
+    taken
+}
+
 /// Which item is next. A worker waits while it would be too far ahead of what is taken.
 struct Queue {
     items: usize,

@@ -4,7 +4,6 @@ use super::archive::ArchiveArgs;
 use super::calibrate::CalibrateArgs;
 use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
-use super::clutter::ClutterArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
 use super::experiment::ExperimentArgs;
@@ -13,11 +12,10 @@ use super::identify::IdentifyArgs;
 use super::limit::LimitArgs;
 use super::night::NightArgs;
 use super::process::ProcessArgs;
-use super::robustness::RobustnessArgs;
 use super::shell::{CompletionsArgs, ManArgs};
 use super::simulate::SimulateArgs;
 use super::track::TrackArgs;
-use super::validate::ValidateArgs;
+use super::validate::{ClutterArgs, HardArgs, RobustnessArgs, SkyArgs, ValidateArgs};
 use clap::{Parser, Subcommand};
 
 /// The version with what it was built from.
@@ -76,11 +74,6 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArgs>),
     /// Convert star catalogues
     Catalog(CatalogArgs),
-    /// Measure how often identification is right, wrong or fails, on simulated lists of centroids
-    Robustness(RobustnessArgs),
-    /// Measure how often names are wrong, on simulated frames with foliage, clouds, trails and the
-    /// like, and whether pictures of no sky are identified
-    Clutter(Box<ClutterArgs>),
     /// Predict the faintest star that a camera detects
     Limit(Box<LimitArgs>),
     /// Write and list descriptions of cameras
@@ -92,6 +85,21 @@ pub(crate) enum Command {
     /// Simulate and process thousands of frames, and compare the results with the truth and with
     /// theory
     Validate(Box<ValidateArgs>),
+    /// Simulate lenses, spots and detectors that are not what the pipeline assumes, and compare the results with
+    /// the truth
+    #[command(hide = true)]
+    ValidateHard(Box<HardArgs>),
+    /// Simulate skies over an all-sky camera that looks at the zenith, and compare what `starpipe sky` measures with
+    /// the truth
+    #[command(hide = true)]
+    ValidateSky(Box<SkyArgs>),
+    /// Measure how often identification is right, wrong or fails, on simulated lists of centroids
+    #[command(hide = true, alias = "robustness")]
+    ValidateRobustness(RobustnessArgs),
+    /// Measure how often names are wrong, on simulated frames with foliage, clouds, trails and the
+    /// like, and whether pictures of no sky are identified
+    #[command(hide = true, alias = "clutter")]
+    ValidateClutter(Box<ClutterArgs>),
     /// Find the spot radius with the smallest centroid error, and the defocus that gives it
     Defocus(Box<DefocusArgs>),
     /// Measure noise, pattern, dark current and hot pixels on frames taken without light

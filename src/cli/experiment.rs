@@ -6,8 +6,8 @@ use super::options::format::PageFormat;
 use super::output::files::{NewFile, make_directory, write_each};
 use super::output::overwrite;
 use super::output::paths::output_path;
+use super::output::rows::json_line;
 use super::progress::frames_bar;
-use anyhow::Context;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
@@ -66,11 +66,9 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
             directory.and_then(|directory| first_picture(&done, indexed, directory, &name));
         Ok((done.report, write_each(picture)))
     })?;
+    let json = || json_line(&report);
     let outcome = Outcome {
-        text: match arguments.format {
-            PageFormat::Text => report.to_text(),
-            PageFormat::Json => report.to_json_line().context("writing JSON")? + "\n",
-        },
+        text: arguments.format.of(|| report.to_text(), json)?,
         exit: if report.is_identified() {
             Exit::Success
         } else {

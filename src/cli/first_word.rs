@@ -1,4 +1,4 @@
-//! The first word of the command line: a command, or frames for `process`.
+//! The first word of the command line: a command, or frames for `process`; and which suite `validate` runs.
 
 use clap::Command;
 use clap::error::ErrorKind;
@@ -17,6 +17,9 @@ const SYNONYMS: [(&str, &str); 9] = [
     ("generate", "simulate"),
     ("completion", "completions"),
 ];
+
+const VALIDATE: &str = "validate";
+const SUITE: &str = "--suite";
 
 /// What the first word of a command line is.
 #[derive(Debug, PartialEq, Eq)]
@@ -42,6 +45,7 @@ pub(crate) fn completed(
         return Ok(words);
     };
     match kind_of(first, program) {
+        FirstWord::Command if first == VALIDATE => return Ok(of_suite(words, program)),
         FirstWord::Command => {}
         FirstWord::Frame => words.insert(1, "process".into()),
         FirstWord::Synonym(command) => {
@@ -53,6 +57,25 @@ pub(crate) fn completed(
         }
     }
     Ok(words)
+}
+
+/// The words of `validate`; with `--suite NAME` those of `validate-NAME`, which has the suite's own options.
+fn of_suite(mut words: Vec<OsString>, program: &Command) -> Vec<OsString> {
+    let found = words.iter().enumerate().find_map(|(place, word)| {
+        let (end, name) = match word.to_str()?.strip_prefix(SUITE)? {
+            "" => (place + 2, words.get(place + 1)?.to_str()?),
+            rest => (place + 1, rest.strip_prefix('=')?),
+        };
+        Some((place..end, format!("{VALIDATE}-{name}")))
+    });
+    // What is no suite is refused by `validate`.
+    if let Some((range, command)) = found
+        && program.find_subcommand(&command).is_some()
+    {
+        words.drain(range);
+        words[1] = command.into();
+    }
+    words
 }
 
 fn kind_of(word: &OsStr, program: &Command) -> FirstWord {
@@ -98,6 +121,34 @@ mod tests {
         let completed = completed(words.into_iter(), &mut Arguments::command()).unwrap();
         assert_eq!(completed[1], "process");
         assert_eq!(completed.len(), 5);
+    }
+
+    #[test]
+    fn a_suite_is_a_command_of_its_own() {
+        let completed = |line: &str| {
+            let words = line.split(' ').map(OsString::from);
+            let words = completed(words, &mut Arguments::command()).unwrap();
+            words.join(OsStr::new(" ")).into_string().unwrap()
+        };
+        for (line, expected) in [
+            ("starpipe validate -h", "starpipe validate -h"),
+            (
+                "starpipe validate --count 2 --suite hard -o a",
+                "starpipe validate-hard --count 2 -o a",
+            ),
+            (
+                "starpipe validate --suite=clutter --kinds sky",
+                "starpipe validate-clutter --kinds sky",
+            ),
+            ("starpipe validate --suite", "starpipe validate --suite"),
+            (
+                "starpipe validate --suite sea",
+                "starpipe validate --suite sea",
+            ),
+            ("starpipe sky --suite hard", "starpipe sky --suite hard"),
+        ] {
+            assert_eq!(completed(line), expected);
+        }
     }
 
     #[test]

@@ -11,7 +11,6 @@ mod batch;
 mod calibrate;
 mod camera;
 mod catalog;
-mod clutter;
 mod command;
 mod darks;
 mod defocus;
@@ -29,7 +28,6 @@ mod page;
 mod plot;
 mod process;
 mod progress;
-mod robustness;
 mod shell;
 mod short_help;
 mod simulate;
@@ -84,8 +82,6 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Track(arguments) => track::track(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(*arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),
-        Command::Robustness(arguments) => robustness::robustness(&arguments),
-        Command::Clutter(arguments) => clutter::clutter(&arguments),
         Command::Night(arguments) => night::night(&arguments),
         Command::Limit(arguments) => limit::limit(&arguments),
         Command::Camera(arguments) => camera::camera(&arguments),
@@ -95,6 +91,10 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Experiment(arguments) => experiment::experiment(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::ValidateHard(arguments) => validate::hard(&arguments),
+        Command::ValidateSky(arguments) => validate::sky(&arguments),
+        Command::ValidateRobustness(arguments) => validate::robustness(&arguments),
+        Command::ValidateClutter(arguments) => validate::clutter(&arguments),
         Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => shell::man(&arguments, Arguments::command()),
     }

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
-const SHOWN: [(&str, [&[&str]; 2]); 12] = [
+const SHOWN: [(&str, [&[&str]; 2]); 14] = [
     ("process", [&["dark", "mask", "draw"], &SOLVING]),
     ("sky", [&["dark", "flat", "mask"], &SOLVING]),
     (
@@ -39,7 +39,7 @@ const SHOWN: [(&str, [&[&str]; 2]); 12] = [
         ],
     ),
     (
-        "robustness",
+        "validate-robustness",
         [
             &["count", "seed", "stars", "missing", "sweep", "plot"],
             &["format", "threads"],
@@ -49,7 +49,9 @@ const SHOWN: [(&str, [&[&str]; 2]); 12] = [
     ("defocus", [&[], &STUDY]),
     ("simulate", [&[], &STUDY]),
     ("validate", [&[], &STUDY]),
-    ("clutter", [&[], &STUDY]),
+    ("validate-hard", [&[], &STUDY]),
+    ("validate-sky", [&[], &STUDY]),
+    ("validate-clutter", [&[], &STUDY]),
 ];
 
 /// Those of commands that read frames.

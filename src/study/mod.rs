@@ -6,4 +6,7 @@ pub mod defocus;
 pub mod experiment;
 pub mod night_sky;
 pub mod robustness;
+mod trials;
 pub mod validation;
+
+pub use trials::StudyError;

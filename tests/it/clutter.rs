@@ -1,11 +1,11 @@
-//! `starpipe clutter`: its table, on any number of threads.
+//! `starpipe validate --suite clutter`: its table, on any number of threads.
 
 use crate::common::{Ran, names, starpipe};
 use serde_json::Value;
 
 fn ran(options: &[&str]) -> Ran {
     let mut command = starpipe();
-    command.args(["clutter", "--preset", "imx174-35mm"]);
+    command.args(["validate", "--suite", "clutter", "--preset", "imx174-35mm"]);
     Ran::new(command.args(options))
 }
 
@@ -66,7 +66,8 @@ fn clutter_is_detected_where_no_star_is() {
 fn blended_stars_are_seldom_named_wrongly() {
     let mut command = starpipe();
     command.args([
-        "clutter",
+        "validate",
+        "--suite=clutter",
         "--preset",
         "nanosat-tracker",
         "--kinds",

@@ -1,4 +1,4 @@
-//! The protocol of `starpipe robustness`: what it draws, its table, and that it recognises wrong
+//! The protocol of `starpipe validate --suite robustness`: what it draws, its table, and that it recognises wrong
 //! answers.
 
 use crate::common::{Ran, sky, starpipe};
@@ -15,12 +15,12 @@ fn draw(protocol: &Protocol, seed: u64) -> SimulatedCentroids {
     SimulatedCentroids::draw(protocol, sky(), &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
-/// Rows of `starpipe robustness` with these options.
+/// Rows of `starpipe validate --suite robustness` with these options.
 fn rows(options: &[&str]) -> Vec<Value> {
     let mut command = starpipe();
     let ran = Ran::new(
         command
-            .args(["robustness", "--format", "json"])
+            .args(["validate", "--suite", "robustness", "--format", "json"])
             .args(options),
     );
     assert_eq!(ran.status, 0, "{}", ran.stderr);

@@ -461,8 +461,24 @@ fn nonsensical_options_are_refused_by_name() {
         (&["--sweep", "band_to_nm=300:500:2"], "band_to_nm of 300"),
         (&["--figures", "gif"], "invalid value 'gif'"),
         (
+            &["--suite", "sea"],
+            "[possible values: hard, sky, robustness, clutter]",
+        ),
+        (
             &["--suite", "hard", "--sweep", "bits=8:9:2"],
-            "cannot be used with",
+            "'--sweep' found\n\nUsage: starpipe validate --suite hard",
+        ),
+        (
+            &["--suite", "sky", "--scale-unknown"],
+            "Usage: starpipe validate --suite sky",
+        ),
+        (
+            &["--suite=clutter"],
+            "Usage: starpipe validate --suite clutter",
+        ),
+        (
+            &["--suite", "robustness"],
+            "Usage: starpipe validate --suite robustness",
         ),
         (&["--camera", "a.toml"], "cannot be used with"),
     ] {

@@ -1,7 +1,7 @@
 //! Frames named on the command line: files, directories of frames, and `-` for standard input.
 
 use super::stdin::{check_once, is_stdin};
-use crate::cli::batch::for_each_ordered;
+use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::input::names::report_passed_over;
 use crate::cli::output::messages::report_error;
@@ -12,7 +12,6 @@ use starpipe::frame::{self, Buffers, Cameras, Folder, Frame, FrameError, PassedO
 use starpipe::pipeline;
 use std::io;
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The frames that the command line names.
@@ -116,31 +115,23 @@ pub(crate) fn for_each_frame<R: Send>(
         Ok(measure(path, frame.into_stored()))
     };
     let mut unread = 0;
-    let mut refused = None;
-    for_each_ordered(
+    let taken = try_for_each_ordered(
         pool,
         paths,
         || (),
         read,
         |_, result| {
             progress.inc(1);
-            let taken = match result {
+            match result {
                 Ok(frame) => take(frame),
                 Err(error) => {
                     unread += 1;
                     progress.suspend(|| report_error(error.as_ref()));
                     Ok(())
                 }
-            };
-            match taken {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(error) => {
-                    refused = Some(error);
-                    ControlFlow::Break(())
-                }
             }
         },
     );
     progress.finish_and_clear();
-    refused.map_or(Ok(unread), Err)
+    taken.map(|()| unread)
 }

@@ -1,52 +1,69 @@
-//! The options of `validate`.
+//! The options of `validate`: those of its runs, and those of the suites of simulated frames.
 
 use super::sweep::StudySweep;
+use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
 use crate::cli::options::setup::SetupOptions;
 use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
-use clap::{Args, ValueEnum};
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::{Arg, Args};
+use starpipe::study::validation::Protocol;
 use std::path::PathBuf;
 
-/// Cases that are run together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Suite {
-    /// Lenses, spots and detectors that are not what the pipeline assumes
-    Hard,
-    /// Skies with Moon, clouds and extinction over an all-sky camera, which looks at the zenith
-    Sky,
+/// Suites by name. `validate --suite NAME` is the hidden command `validate-NAME`, as each has options of its own.
+const SUITES: [(&str, &str); 4] = [
+    (
+        "hard",
+        "Lenses, spots and detectors that are not what the pipeline assumes",
+    ),
+    (
+        "sky",
+        "Skies with Moon, clouds and extinction over an all-sky camera, which looks at the zenith",
+    ),
+    (
+        "robustness",
+        "Lists of centroids with errors, missing and false stars: how often identification is right",
+    ),
+    (
+        "clutter",
+        "Frames with foliage, clouds, trails and the like, and pictures of no sky: how often names are wrong",
+    ),
+];
+
+/// The option that chooses a suite, for help and for names that are none.
+fn suite() -> Arg {
+    let names = SUITES.map(|(name, about)| PossibleValue::new(name).help(about));
+    Arg::new("suite")
+        .long("suite")
+        .value_name("SUITE")
+        .help("Run a suite in place of frames of one camera. Each has options of its own: starpipe validate --suite NAME --help")
+        .value_parser(PossibleValuesParser::new(names))
 }
 
 #[derive(Debug, Args)]
+#[command(arg = suite())]
 #[command(after_help = "Examples:\n  \
     starpipe validate --camera camera.toml --count 1000 --seed 1 --out validation\n  \
     starpipe validate --preset nanosat-tracker --exposure 0.2 --scale-unknown --out validation --html\n  \
     starpipe validate --camera camera.toml --count 500 --sweep read_noise_e=1:30:7:log --out study\n  \
     starpipe validate --camera camera.toml --sweep fov_deg=4:32:8 --out study\n  \
-    starpipe validate --camera camera.toml --count 200 --suite hard --out hard\n  \
-    starpipe validate --camera all-sky.toml --count 300 --suite sky --out sky\n\n\
+    starpipe validate --suite clutter --help\n\n\
     Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
     gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
     frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
-    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json;\n\
-    the hard suite does so in DIR/CASE/, suite.csv, suite.json and suite.txt. The sky suite writes frames.csv,\n\
-    cells.csv and the same summary.\n\n\
+    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json.\n\n\
     A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
-    --count extends it. The results are the same to the last byte on any number of threads.")]
+    --count extends it. The results are the same to the last byte on any number of threads.\n\n\
+    These are the options without --suite. starpipe validate --suite NAME --help has those of a suite:\n\
+    hard, sky, robustness or clutter.")]
 pub(crate) struct ValidateArgs {
-    /// Frames; in a study, of each value
-    #[arg(long, alias = "frames", value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    pub(crate) count: u64,
-    /// Seed of the random numbers
-    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Directory for the results; an interrupted run in it is continued
-    #[arg(short, long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(super) run: RunOptions,
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
-    pub(crate) scale_unknown: bool,
+    pub(super) scale_unknown: bool,
     /// Study: a run for each value of one parameter, named as its option with _ or -, or fov_deg
     /// (may be repeated); :log spaces the values by even ratios
     #[arg(
@@ -54,20 +71,73 @@ pub(crate) struct ValidateArgs {
         value_name = "NAME=FROM:TO:COUNT[:log]",
         allow_hyphen_values = true
     )]
-    pub(crate) sweep: Vec<StudySweep>,
-    /// A run for each case of a suite
-    #[arg(long, value_enum, conflicts_with = "sweep")]
-    pub(crate) suite: Option<Suite>,
+    pub(super) sweep: Vec<StudySweep>,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    override_usage = "starpipe validate --suite hard [OPTIONS] --out <DIR> <--camera <camera.toml>|--preset <NAME>>"
+)]
+#[command(after_help = "Examples:\n  \
+    starpipe validate --suite hard --camera camera.toml --count 200 --out hard\n\n\
+    Each case is a run as starpipe validate does it: its results are in DIR/CASE/, and a row for each case is in\n\
+    suite.csv, suite.json and suite.txt. A run that was stopped goes on with the same command.")]
+pub(crate) struct HardArgs {
+    #[command(flatten)]
+    pub(super) run: RunOptions,
+    /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
+    #[arg(long)]
+    pub(super) scale_unknown: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    override_usage = "starpipe validate --suite sky [OPTIONS] --out <DIR> <--camera <camera.toml>|--preset <NAME>>"
+)]
+#[command(after_help = "Examples:\n  \
+    starpipe validate --suite sky --camera all-sky.toml --count 300 --out sky\n\n\
+    Date, Moon, clouds, brightness, extinction, exposure, gain, bits and bias are drawn for each frame. DIR gets\n\
+    frames.csv and cells.csv with what was drawn and what was measured, suite.csv, suite.json and suite.txt with the\n\
+    errors in groups of frames, and a figure. A run that was stopped goes on with the same command.")]
+pub(crate) struct SkyArgs {
+    #[command(flatten)]
+    pub(super) run: RunOptions,
+}
+
+/// Options of all runs with simulated frames whose results a directory keeps.
+#[derive(Debug, Args)]
+pub(super) struct RunOptions {
+    /// Frames; in a study or a suite, of each value or case
+    #[arg(long, alias = "frames", value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(super) count: u64,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Directory for the results; an interrupted run in it is continued
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) out: PathBuf,
     /// Format of the figures
     #[arg(long, value_enum, default_value_t = FigureForm::Svg)]
-    pub(crate) figures: FigureForm,
+    pub(super) figures: FigureForm,
     #[command(flatten)]
-    pub(crate) html: HtmlOption,
+    pub(super) html: HtmlOption,
     /// What to print
     #[arg(long, value_enum, default_value_t = PageFormat::Text)]
-    pub(crate) format: PageFormat,
+    pub(super) format: PageFormat,
     #[command(flatten)]
-    pub(crate) setup: SetupOptions,
+    setup: SetupOptions,
     #[command(flatten)]
-    pub(crate) catalog: CatalogOptions,
+    pub(super) catalog: CatalogOptions,
+}
+
+impl RunOptions {
+    /// What is simulated; whether the pipeline is given the camera's description.
+    pub(super) fn protocol(&self, scale_known: bool) -> Result<Protocol, CommandError> {
+        Ok(Protocol {
+            setup: self.setup.setup()?,
+            scale_known,
+            site: None,
+            seed: self.seed,
+        })
+    }
 }

@@ -1,10 +1,13 @@
-//! `validate`: simulated frames through the pipeline, run by run; studies over a parameter.
+//! `validate`: simulated frames through the pipeline, run by run; studies over a parameter; and the suites, each
+//! with options of its own.
 
 mod args;
+mod clutter;
 mod figures;
 mod frames;
 mod page;
 mod parquet;
+mod robustness;
 mod run;
 mod shared;
 mod sky;
@@ -12,83 +15,91 @@ mod study;
 mod suite;
 mod sweep;
 
-use args::Suite;
-pub(crate) use args::ValidateArgs;
+pub(crate) use args::{HardArgs, SkyArgs, ValidateArgs};
+pub(crate) use clutter::{ClutterArgs, clutter};
+pub(crate) use robustness::{RobustnessArgs, robustness};
 
 use super::exit::{CommandError, Outcome};
-use super::options::format::PageFormat;
 use super::output::files::write_each;
 use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
+use args::RunOptions;
 use shared::Shared;
 use starpipe::report::page::{Page, Thumbnail};
-use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol, StudyRow};
+use starpipe::study::validation::{HARD_SUITE, HardRow, StudyRow};
 use std::cell::Cell;
 
-/// `starpipe validate`
+/// `starpipe validate` without a suite
 pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError> {
-    let protocol = Protocol {
-        setup: arguments.setup.setup()?,
-        scale_known: !arguments.scale_unknown,
-        site: None,
-        seed: arguments.seed,
-    };
-    let study_runs = study::runs(&arguments.sweep, &protocol)?;
-    let runs = match arguments.suite {
-        Some(Suite::Hard) => HARD_SUITE.len(),
-        Some(Suite::Sky) => 1,
-        None => study_runs.len().max(1),
-    } as u64;
-    let default = || arguments.out.join("validate.html");
-    let page_path = arguments.html.checked_path(&[], default)?;
-    arguments.catalog.with_index(|pool, indexed| {
+    let options = &arguments.run;
+    let protocol = options.protocol(!arguments.scale_unknown)?;
+    let runs = study::runs(&arguments.sweep, &protocol)?;
+    if runs.is_empty() {
+        return with_page(options, 1, |shared| {
+            let done = run::run(&options.out, &protocol, shared)?;
+            let json = || json_line(&done.summary);
+            let text = options.format.of(|| done.summary.to_text(), json)?;
+            Ok((text, page::of_run(done)?))
+        });
+    }
+    with_page(options, runs.len(), |shared| {
+        let (rows, failed) = study::run(&options.out, &runs, shared)?;
+        let json = || json_lines(rows.iter());
+        let text = options.format.of(|| StudyRow::to_text(&rows), json)?;
+        let camera = &protocol.setup.scenario.camera.name;
+        Ok((text, page::of_study(camera, &rows, failed)?))
+    })
+}
+
+/// `starpipe validate --suite hard`
+pub(crate) fn hard(arguments: &HardArgs) -> Result<Outcome, CommandError> {
+    let options = &arguments.run;
+    let protocol = options.protocol(!arguments.scale_unknown)?;
+    with_page(options, HARD_SUITE.len(), |shared| {
+        let (rows, failed) = suite::run(&options.out, &protocol, shared)?;
+        let json = || json_lines(rows.iter());
+        let text = options.format.of(|| HardRow::to_text(&rows), json)?;
+        let camera = &protocol.setup.scenario.camera.name;
+        Ok((text, page::of_suite(camera, &rows, failed)?))
+    })
+}
+
+/// `starpipe validate --suite sky`
+pub(crate) fn sky(arguments: &SkyArgs) -> Result<Outcome, CommandError> {
+    let options = &arguments.run;
+    let protocol = options.protocol(true)?;
+    with_page(options, 1, |shared| {
+        let (summary, trials) = sky::run(&options.out, &protocol, shared)?;
+        let json = || json_line(&summary);
+        let text = options.format.of(|| summary.to_text(), json)?;
+        let camera = &protocol.setup.scenario.camera.name;
+        let sheet = sky::sheet(&trials, &summary);
+        Ok((text, page::of_sky(camera, &summary, &sheet)?))
+    })
+}
+
+/// Does `work`, so many runs, and writes its page if one is asked for.
+fn with_page(
+    options: &RunOptions,
+    runs: usize,
+    work: impl FnOnce(&Shared) -> Result<(String, Page), CommandError>,
+) -> Result<Outcome, CommandError> {
+    let default = || options.out.join("validate.html");
+    let page_path = options.html.checked_path(&[], default)?;
+    options.catalog.with_index(|pool, indexed| {
         let shared = Shared {
             indexed,
             pool,
-            frames: arguments.count,
-            figures: arguments.figures,
-            pictures: page_path
-                .as_ref()
-                .map(|_| Thumbnail::MOST.div_ceil(runs as usize)),
-            progress: frames_bar_with_speed(arguments.count * runs),
+            frames: options.count,
+            figures: options.figures,
+            pictures: page_path.as_ref().map(|_| Thumbnail::MOST.div_ceil(runs)),
+            progress: frames_bar_with_speed(options.count * runs as u64),
             all_written: Cell::new(true),
         };
-        let camera = &protocol.setup.scenario.camera.name;
-        let (text, page): (String, Page) = if arguments.suite == Some(Suite::Sky) {
-            let (summary, trials) = sky::run(&arguments.out, &protocol, &shared)?;
-            let text = match arguments.format {
-                PageFormat::Text => summary.to_text(),
-                PageFormat::Json => json_line(&summary)?,
-            };
-            (
-                text,
-                page::of_sky(camera, &summary, &sky::sheet(&trials, &summary))?,
-            )
-        } else if arguments.suite.is_some() {
-            let (rows, failed) = suite::run(&arguments.out, &protocol, &shared)?;
-            let text = match arguments.format {
-                PageFormat::Text => HardRow::to_text(&rows),
-                PageFormat::Json => json_lines(rows.iter())?,
-            };
-            (text, page::of_suite(camera, &rows, failed)?)
-        } else if study_runs.is_empty() {
-            let done = run::run(&arguments.out, &protocol, &shared)?;
-            let text = match arguments.format {
-                PageFormat::Text => done.summary.to_text(),
-                PageFormat::Json => json_line(&done.summary)?,
-            };
-            (text, page::of_run(done)?)
-        } else {
-            let (rows, failed) = study::run(&arguments.out, &study_runs, &shared)?;
-            let text = match arguments.format {
-                PageFormat::Text => StudyRow::to_text(&rows),
-                PageFormat::Json => json_lines(rows.iter())?,
-            };
-            (text, page::of_study(camera, &rows, failed)?)
-        };
+        let (text, page) = work(&shared)?;
         shared.progress.finish_and_clear();
         let page = page_path.as_ref().map(|path| {
-            let page = page::with_provenance(page, arguments.seed, indexed.catalog());
+            let page = page::with_provenance(page, options.seed, indexed.catalog());
             super::page::file(path, &page)
         });
         let all_written = write_each(page) && shared.all_written.get();

@@ -62,20 +62,17 @@ pub(super) fn of_suite(
         nees: row.nees_mean.zip(row.nees_sigma),
     };
     let runs: Vec<Trials> = rows.iter().map(case).collect();
-    let mut page = Page {
+    let page = Page {
         title: format!("Hard cases for {camera}"),
         question: format!(
             "How often is a frame identified where lens, spot or detector are not what the pipeline assumes? {}.",
             counted(rows.len(), "case")
         ),
-        answer: answer_of(&runs),
-        notes: doubts(&runs),
         text: HardRow::to_text(rows),
         tables: vec![table("Cases", &csv_table(rows.iter())?)?],
         ..Page::default()
     };
-    add_failed(&mut page, failed)?;
-    Ok(page)
+    with_runs(page, &runs, failed)
 }
 
 /// The page of the sky suite.
@@ -122,8 +119,6 @@ pub(super) fn of_study(
             "How do identification, limit and errors depend on a parameter? {}.",
             counted(rows.len(), "value")
         ),
-        answer: answer_of(&runs),
-        notes: doubts(&runs),
         text: StudyRow::to_text(rows),
         tables: vec![table("Values", &csv_table(rows.iter())?)?],
         ..Page::default()
@@ -132,8 +127,7 @@ pub(super) fn of_study(
         let caption = format!("Identification, limit and errors over {name}");
         page.figures.push(figure(&sheet, &caption)?);
     }
-    add_failed(&mut page, failed)?;
-    Ok(page)
+    with_runs(page, &runs, failed)
 }
 
 /// The page with where it is from.
@@ -146,15 +140,21 @@ pub(super) fn with_provenance(page: Page, seed: u64, of_stars: &Catalog) -> Page
     Page { provenance, ..page }
 }
 
-fn add_failed(page: &mut Page, failed: FailedFrames) -> anyhow::Result<()> {
+/// The page with the answer of several runs, their doubts, and the frames that failed.
+fn with_runs(mut page: Page, runs: &[Trials], failed: FailedFrames) -> anyhow::Result<Page> {
     if !failed.rows.is_empty() {
-        page.tables
-            .push(table(FAILED, &csv_table(failed.rows.iter())?)?);
+        let csv = csv_table(failed.rows.iter())?;
+        page.tables.push(table(FAILED, &csv)?);
     }
-    page.notes.extend(cut_note(failed.rows.len()));
-    page.thumbnails_title = FAILED.to_owned();
-    page.thumbnails = failed.pictures;
-    Ok(())
+    let counts = [0, 1, 2].map(|of| runs.iter().map(|run| run.counts[of]).sum());
+    let notes = doubts(runs).into_iter().chain(cut_note(failed.rows.len()));
+    Ok(Page {
+        answer: rates(counts),
+        notes: notes.collect(),
+        thumbnails_title: FAILED.to_owned(),
+        thumbnails: failed.pictures,
+        ..page
+    })
 }
 
 fn cut_note(rows: usize) -> Option<String> {
@@ -179,10 +179,6 @@ struct Trials {
     counts: [usize; 3],
     /// Mean and its standard error.
     nees: Option<(f64, f64)>,
-}
-
-fn answer_of(runs: &[Trials]) -> String {
-    rates([0, 1, 2].map(|of| runs.iter().map(|run| run.counts[of]).sum()))
 }
 
 /// Notes on runs with wrong answers, on the one with the fewest right ones, and on errors that are stated

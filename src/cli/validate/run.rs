@@ -4,18 +4,17 @@ use super::figures;
 use super::frames::RunFrames;
 use super::parquet::Parts;
 use super::shared::Shared;
-use crate::cli::batch::for_each_ordered;
+use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::{made, remove_outdated};
+use crate::cli::output::files::remove_outdated;
 use crate::cli::output::rows::json_indented;
-use crate::cli::plot::figure_files;
 use serde::Serialize;
 use starpipe::pipeline::Workspace;
+use starpipe::study::StudyError;
 use starpipe::study::validation::store::{
     FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
-use starpipe::study::validation::{Protocol, Summary, ValidationError, Validator};
-use std::ops::ControlFlow;
+use starpipe::study::validation::{Protocol, Summary, Validator};
 use std::path::Path;
 use std::time::Instant;
 
@@ -48,9 +47,7 @@ pub(super) fn run(
     shared: &Shared,
 ) -> Result<Run, CommandError> {
     let validator = Validator::new(shared.indexed, protocol).map_err(|error| match error {
-        ValidationError::Scenario(_) | ValidationError::NoLimit => {
-            CommandError::Usage(error.to_string())
-        }
+        StudyError::Scenario(_) | StudyError::NoLimit => CommandError::usage(error),
         other => CommandError::Failed(other.into()),
     })?;
     claim_directory(directory, protocol, shared.indexed.catalog()).map_err(claim_error)?;
@@ -108,10 +105,7 @@ fn complete(
     parts.remove_unfinished(tables)?;
     let timing = simulate(validator, tables, parts, shared)?;
     let text = json_indented(&timing)?;
-    shared.write_into(
-        directory,
-        [Ok(("timing.json".to_owned(), text.into_bytes()))],
-    );
+    shared.write(directory, [("timing.json", text)], Vec::new());
     shared.report(format_args!(
         "{} frames in {:.1} s, {:.1} frames a second; {:.1} ms to simulate one, {:.1} ms to process it",
         timing.frames, timing.wall_s, timing.frames_per_s, timing.simulate_ms, timing.process_ms
@@ -158,32 +152,20 @@ fn simulate_part(
         let lines = FrameLines::new(&trial.frame, &trial.stars)?;
         Ok((lines, trial.simulate_ms, trial.process_ms))
     };
-    let mut result = Ok(());
-    for_each_ordered(shared.pool, &numbers, Workspace::new, work, |_, done| {
+    try_for_each_ordered(shared.pool, &numbers, Workspace::new, work, |_, done| {
         shared.progress.inc(1);
-        let added = done.and_then(|(lines, simulate_ms, process_ms)| {
-            timing.simulate_ms += simulate_ms;
-            timing.process_ms += process_ms;
-            timing.frames += 1;
-            Ok(tables.add(&lines)?)
-        });
-        match added {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                result = Err(error);
-                ControlFlow::Break(())
-            }
-        }
-    });
-    result
+        let (lines, simulate_ms, process_ms) = done?;
+        timing.simulate_ms += simulate_ms;
+        timing.process_ms += process_ms;
+        timing.frames += 1;
+        Ok(tables.add(&lines)?)
+    })
 }
 
 /// Writes the summary as JSON and text, and its figures.
 fn save(directory: &Path, summary: &Summary, shared: &Shared) -> anyhow::Result<()> {
     let texts = [json_indented(summary)?, summary.to_text()];
-    let results = RESULTS.into_iter().zip(texts);
-    let results = results.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = made(figure_files(figures::of_run(summary), shared.figures));
-    shared.write_into(directory, results.map(Ok).chain(figures));
+    let sheets = figures::of_run(summary);
+    shared.write(directory, RESULTS.into_iter().zip(texts), sheets);
     Ok(())
 }

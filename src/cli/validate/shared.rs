@@ -1,8 +1,8 @@
 //! What the runs of one command have in common.
 
-use crate::cli::output::files::write_into;
+use crate::cli::output::files::{made, write_into};
 use crate::cli::output::messages::report;
-use crate::cli::plot::FigureForm;
+use crate::cli::plot::{FigureForm, Sheet, figure_files};
 use indicatif::ProgressBar;
 use starpipe::identify::IndexedCatalog;
 use std::cell::Cell;
@@ -25,12 +25,16 @@ pub(super) struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    /// Writes files into a directory; what fails is told.
-    pub(super) fn write_into(
+    /// Writes texts and figures into a directory; what fails is told.
+    pub(super) fn write<'t>(
         &self,
         directory: &Path,
-        files: impl IntoIterator<Item = anyhow::Result<(String, Vec<u8>)>>,
+        texts: impl IntoIterator<Item = (&'t str, String)>,
+        sheets: Vec<(&str, Sheet)>,
     ) {
+        let file = |(name, text): (&str, String)| Ok((name.to_owned(), text.into_bytes()));
+        let figures = made(figure_files(sheets, self.figures));
+        let files = texts.into_iter().map(file).chain(figures);
         let written = self.progress.suspend(|| write_into(directory, files));
         self.all_written.set(self.all_written.get() && written);
     }

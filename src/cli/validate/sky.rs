@@ -1,18 +1,16 @@
 //! The sky suite: simulated skies, compared with the truth in each cell.
 
 use super::shared::Shared;
-use crate::cli::batch::for_each_ordered;
+use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::made;
 use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::rows::{csv_table, json_indented};
-use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet, figure_files};
+use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
 use starpipe::ephemeris::observer::Site;
 use starpipe::pipeline::Workspace;
 use starpipe::study::night_sky::{FrameRow, SkyStudy, SkySummary, SkyTrial};
 use starpipe::study::validation::Protocol;
 use starpipe::study::validation::store::claim_directory;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Where the frames are taken.
@@ -58,23 +56,13 @@ pub(super) fn run(
     shared.progress.inc(shared.frames - left.len() as u64);
     shared.progress.reset_eta();
     let work = |number: &u64, workspace: &mut Workspace| study.run_one(*number, workspace);
-    let mut failed = Ok(());
-    for_each_ordered(shared.pool, &left, Workspace::new, work, |number, made| {
+    try_for_each_ordered(shared.pool, &left, Workspace::new, work, |number, made| {
         shared.progress.inc(1);
-        let added = made.map_err(anyhow::Error::from).and_then(|trial| {
-            journal.add([&trial])?;
-            trials[*number as usize] = Some(trial);
-            Ok(())
-        });
-        match added {
-            Ok(()) => ControlFlow::Continue(()),
-            Err(error) => {
-                failed = Err(error);
-                ControlFlow::Break(())
-            }
-        }
-    });
-    failed?;
+        let trial = made?;
+        journal.add([&trial])?;
+        trials[*number as usize] = Some(trial);
+        Ok(())
+    })?;
     journal.finish::<SkyTrial>()?;
     let trials: Vec<SkyTrial> = trials.into_iter().flatten().collect();
     let summary = SkySummary::of(&trials);
@@ -101,9 +89,7 @@ fn save(
         ("suite.csv", csv_table(summary.groups.iter())?),
         ("suite.txt", summary.to_text()),
     ];
-    let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figure_files(vec![("sky", sheet(trials, summary))], shared.figures);
-    shared.write_into(directory, tables.into_iter().map(Ok).chain(made(figures)));
+    shared.write(directory, tables, vec![("sky", sheet(trials, summary))]);
     Ok(())
 }
 

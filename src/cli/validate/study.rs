@@ -5,11 +5,9 @@ use super::shared::Shared;
 use super::sweep::StudySweep;
 use super::{figures, run};
 use crate::cli::exit::CommandError;
-use crate::cli::output::files::made;
 use crate::cli::output::rows::{csv_table, json_indented};
-use crate::cli::plot::figure_files;
 use starpipe::model::sensitivity::Spacing;
-use starpipe::study::validation::{Protocol, StudyParameter, StudyRow};
+use starpipe::study::validation::{Protocol, StudyParameter, StudyRow, Summary};
 use std::path::Path;
 
 /// One value of one parameter.
@@ -46,31 +44,39 @@ pub(super) fn runs(sweeps: &[StudySweep], base: &Protocol) -> Result<Vec<StudyRu
     Ok(runs)
 }
 
-/// Does all runs, one after the other, and writes a table and figures of them.
+/// Does all runs, and writes a table and figures of them.
 pub(super) fn run(
     directory: &Path,
     runs: &[StudyRun],
     shared: &Shared,
 ) -> Result<(Vec<StudyRow>, FailedFrames), CommandError> {
-    let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());
-    for run in runs {
+    let cases = runs.iter().map(|run| {
         let name = format!("{}={}", run.parameter.name(), run.value);
-        let case = directory.join(&name);
-        let done = run::run(&case, &run.protocol, shared)?;
-        rows.push(StudyRow::new(
-            run.parameter,
-            run.value,
-            run.spacing,
-            &done.summary,
-        ));
-        failed.add(&name, done.frames);
-    }
+        let row = |summary: &_| StudyRow::new(run.parameter, run.value, run.spacing, summary);
+        Ok((name, run.protocol.clone(), row))
+    });
+    let (rows, failed) = run_each(directory, cases, shared)?;
     let tables = [
         ("study.json", json_indented(&rows)?),
         ("study.csv", csv_table(rows.iter())?),
     ];
-    let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = made(figure_files(figures::of_study(&rows), shared.figures));
-    shared.write_into(directory, tables.into_iter().map(Ok).chain(figures));
+    shared.write(directory, tables, figures::of_study(&rows));
+    Ok((rows, failed))
+}
+
+/// Does runs one after the other, each in the directory of its name. Returns a row for each, and the frames that
+/// failed.
+pub(super) fn run_each<R, F: FnOnce(&Summary) -> R>(
+    directory: &Path,
+    cases: impl Iterator<Item = Result<(String, Protocol, F), CommandError>>,
+    shared: &Shared,
+) -> Result<(Vec<R>, FailedFrames), CommandError> {
+    let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());
+    for case in cases {
+        let (name, protocol, row) = case?;
+        let done = run::run(&directory.join(&name), &protocol, shared)?;
+        rows.push(row(&done.summary));
+        failed.add(&name, done.frames);
+    }
     Ok((rows, failed))
 }

@@ -1,8 +1,8 @@
 //! The hard suite: a run for each case, and a row for each run.
 
 use super::frames::FailedFrames;
-use super::run;
 use super::shared::Shared;
+use super::study::run_each;
 use crate::cli::exit::CommandError;
 use crate::cli::output::rows::{csv_table, json_indented};
 use starpipe::study::validation::{HARD_SUITE, HardRow, Protocol};
@@ -14,21 +14,19 @@ pub(super) fn run(
     base: &Protocol,
     shared: &Shared,
 ) -> Result<(Vec<HardRow>, FailedFrames), CommandError> {
-    let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());
-    for case in &HARD_SUITE {
+    let cases = HARD_SUITE.iter().map(|case| {
         let protocol = case.protocol(base);
         let check = protocol.setup.check();
         check.map_err(|error| CommandError::Usage(format!("{}: {error}", case.name)))?;
-        let done = run::run(&directory.join(case.name), &protocol, shared)?;
-        rows.push(HardRow::new(case, &done.summary));
-        failed.add(case.name, done.frames);
-    }
+        let row = |summary: &_| HardRow::new(case, summary);
+        Ok((case.name.to_owned(), protocol, row))
+    });
+    let (rows, failed) = run_each(directory, cases, shared)?;
     let tables = [
         ("suite.json", json_indented(&rows)?),
         ("suite.csv", csv_table(rows.iter())?),
         ("suite.txt", HardRow::to_text(&rows)),
     ];
-    let tables = tables.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    shared.write_into(directory, tables.map(Ok));
+    shared.write(directory, tables, Vec::new());
     Ok((rows, failed))
 }

@@ -6,6 +6,7 @@ use crate::identify::{Identification, StarMatch};
 use crate::model::simulate::{TrueStar, Truth};
 use crate::pipeline::{Solution, Source};
 use crate::study::robustness::Answer;
+use crate::study::trials::is_star_like;
 use crate::study::validation::LightMap;
 
 /// The result of one frame.
@@ -71,10 +72,6 @@ fn answer(maker: &FrameMaker, sky: Option<&TrueSky>, found: Option<&Identificati
             &sky.pointing.icrs_to_camera,
         ),
     }
-}
-
-fn is_star_like(source: &Source) -> bool {
-    source.measured.is_some_and(|m| m.flags.is_star_like())
 }
 
 /// The true stars of a frame.

@@ -5,28 +5,15 @@ use super::kind::Kind;
 use super::{no_sky, recording, scenery};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::ephemeris::places::StarPlaces;
-use crate::frame::{Frame, FrameError, FrameMetadata};
+use crate::frame::{Frame, FrameMetadata};
 use crate::identify::IndexedCatalog;
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario, ScenarioError};
 use crate::model::simulate::{Pointing, Setup, Simulator, TrueStar, Truth};
+use crate::study::StudyError;
 use crate::study::robustness::random_rotation;
-use rand::{Rng, SeedableRng};
+use crate::study::trials::random_of;
+use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-
-/// Why a study is impossible.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ClutterError {
-    /// The scenario is invalid.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A frame cannot be simulated or recorded.
-    #[error("simulating a frame")]
-    Simulate(#[from] FrameError),
-    /// A frame cannot be processed.
-    #[error("detecting stars in a simulated frame")]
-    Detect(#[from] crate::detect::DetectError),
-}
 
 /// A frame of a study.
 #[derive(Debug, Clone)]
@@ -59,12 +46,12 @@ impl<'a> FrameMaker<'a> {
     /// Prepares what all frames of `kind` have in common.
     ///
     /// # Errors
-    /// [`ClutterError::Scenario`], [`ClutterError::Simulate`].
+    /// [`StudyError::Scenario`], [`StudyError::Simulate`].
     pub fn new(
         kind: Kind,
         setup: &Setup,
         indexed: &'a IndexedCatalog<'a>,
-    ) -> Result<Self, ClutterError> {
+    ) -> Result<Self, StudyError> {
         setup.check()?;
         let catalog = indexed.catalog();
         let plain = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())?;
@@ -81,12 +68,11 @@ impl<'a> FrameMaker<'a> {
     /// The frame with this number in a study with this `seed`.
     ///
     /// # Errors
-    /// [`ClutterError`] where it cannot be simulated or recorded.
-    pub fn frame(&self, seed: u64, number: u64) -> Result<ClutteredFrame, ClutterError> {
+    /// [`StudyError`] where it cannot be simulated or recorded.
+    pub fn frame(&self, seed: u64, number: u64) -> Result<ClutteredFrame, StudyError> {
         /// More frames than any study has.
         const KIND_STRIDE: u64 = 1 << 40;
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        random.set_stream(self.kind as u64 * KIND_STRIDE + number);
+        let mut random = random_of(seed, self.kind as u64 * KIND_STRIDE + number);
         if !self.kind.is_sky() {
             let frame = no_sky::picture(self.kind, &mut random)?;
             return Ok(ClutteredFrame { frame, sky: None });
@@ -123,7 +109,7 @@ impl<'a> FrameMaker<'a> {
         frame: Frame<'static>,
         canvas: &mut ClutterCanvas,
         random: &mut ChaCha8Rng,
-    ) -> Result<Frame<'static>, ClutterError> {
+    ) -> Result<Frame<'static>, StudyError> {
         match self.kind {
             Kind::Foliage => scenery::foliage(canvas, random),
             Kind::Edges => {

@@ -29,7 +29,7 @@ mod scenery;
 mod table;
 
 pub use evaluation::FrameResult;
-pub use frames::{ClutterError, ClutteredFrame, FrameMaker, TrueSky};
+pub use frames::{ClutteredFrame, FrameMaker, TrueSky};
 pub use kind::Kind;
 pub use table::KindResult;
 
@@ -37,7 +37,7 @@ use crate::detect::DetectConfig;
 use crate::identify::IndexedCatalog;
 use crate::model::simulate::Setup;
 use crate::pipeline::{Context, Workspace, solve_frame};
-use rayon::prelude::*;
+use crate::study::{StudyError, trials};
 
 /// What all kinds of frames of a study have in common.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,13 +53,13 @@ pub struct Protocol {
 /// Runs the frames of one kind on the threads of the current pool; `done` is called after each.
 ///
 /// # Errors
-/// [`ClutterError`] where a frame cannot be made or processed.
+/// [`StudyError`] where a frame cannot be made or processed.
 pub fn run(
     kind: Kind,
     protocol: &Protocol,
     indexed: &IndexedCatalog,
     done: &(dyn Fn() + Sync),
-) -> Result<KindResult, ClutterError> {
+) -> Result<KindResult, StudyError> {
     let maker = FrameMaker::new(kind, &protocol.setup, indexed)?;
     let asked_per_mpx = protocol.setup.scenario.conditions.false_alarms_per_mpx;
     let context = Context {
@@ -69,15 +69,11 @@ pub fn run(
         },
         ..Context::new(indexed)
     };
-    let result = |workspace: &mut Workspace, number: u64| {
+    let result = |number: u64, workspace: &mut Workspace| {
         let made = maker.frame(protocol.seed, number)?;
         let solution = solve_frame(&made.frame, &context, workspace)?;
-        done();
         Ok(evaluation::evaluate(&maker, made.sky.as_ref(), &solution))
     };
-    let results: Result<Vec<FrameResult>, ClutterError> = (0..protocol.frames)
-        .into_par_iter()
-        .map_init(Workspace::new, result)
-        .collect();
+    let results: Result<Vec<FrameResult>, StudyError> = trials::run(protocol.frames, done, result);
     Ok(KindResult::new(kind, &results?, &protocol.setup.scenario))
 }

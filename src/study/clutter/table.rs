@@ -4,55 +4,37 @@ use super::evaluation::FrameResult;
 use super::kind::Kind;
 use crate::base::format::{to_decimals, to_significant};
 use crate::model::sensitivity::Scenario;
-use crate::study::robustness::{Answer, Interval};
+use crate::study::robustness::{Answers, Interval};
 use serde::Serialize;
+
+const HEADING: &str = "                  frames   right  wrong  detected  false/Mpx asked for    named   wrong            95 %   stated\n";
 
 /// The results of all frames of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct KindResult {
-    /// The camera's name.
     pub camera: String,
-    /// The kind.
     pub kind: Kind,
-    /// Whether it shows the sky. Where it does not, every identification is wrong.
     pub is_sky: bool,
-    /// Number of frames.
     pub frames: usize,
-    /// Frames that were identified rightly.
     pub right: usize,
-    /// Frames that were identified wrongly.
     pub wrong: usize,
-    /// Upper end of the 95 % interval of the rate of wrong pointings.
     pub wrong_high_percent: f64,
-    /// Detections that may be stars.
     pub detected: usize,
-    /// Detections that may be stars where none is: clutter, or noise.
     pub false_detections: usize,
-    /// The same, in a million pixels.
     pub false_per_mpx: f64,
-    /// The number of false detections from noise alone that was asked for.
     pub asked_per_mpx: f64,
-    /// Detections with a name, in all identified frames.
     pub named: usize,
-    /// Detections with a wrong name: that star is not there.
     pub misnamed: usize,
-    /// Lower end of the 95 % interval of the share of wrong names.
     pub misnamed_low_percent: f64,
-    /// Upper end of it.
     pub misnamed_high_percent: f64,
-    /// The number of wrong names that the stated probabilities add up to.
     pub stated_misnamed: f64,
 }
 
 impl KindResult {
     /// The results of the frames of a kind in a study of `scenario`.
     pub fn new(kind: Kind, results: &[FrameResult], scenario: &Scenario) -> Self {
-        let count = |answer| {
-            results
-                .iter()
-                .filter(|result| result.answer == answer)
-                .count()
-        };
+        let answers: Answers = results.iter().map(|result| result.answer).collect();
         let sum = |of: fn(&FrameResult) -> usize| results.iter().map(of).sum::<usize>();
         let megapixels: f64 = results.iter().map(|result| result.megapixels).sum();
         let (named, misnamed) = (sum(|r| r.named), sum(|r| r.misnamed));
@@ -65,9 +47,9 @@ impl KindResult {
             kind,
             is_sky: kind.is_sky(),
             frames: results.len(),
-            right: count(Answer::Right),
-            wrong: count(Answer::Wrong),
-            wrong_high_percent: percent(Interval::of(count(Answer::Wrong), results.len()).high),
+            right: answers.right,
+            wrong: answers.wrong,
+            wrong_high_percent: percent(answers.wrong_interval().high),
             detected: sum(|r| r.detected),
             false_detections,
             false_per_mpx: to_significant(false_detections as f64 / megapixels, 4),
@@ -82,20 +64,7 @@ impl KindResult {
 
     /// The rows as text, with sums over the frames with and without sky.
     pub fn to_text(rows: &[Self]) -> String {
-        let mut text = format!(
-            "{:<16} {:>7} {:>7} {:>6} {:>9} {:>10} {:>9} {:>8} {:>7} {:>15} {:>8}\n",
-            "",
-            "frames",
-            "right",
-            "wrong",
-            "detected",
-            "false/Mpx",
-            "asked for",
-            "named",
-            "wrong",
-            "95 %",
-            "stated"
-        );
+        let mut text = HEADING.to_owned();
         for row in rows {
             text += &row.line();
         }
@@ -153,6 +122,7 @@ fn names(named: usize, misnamed: usize, stated: f64) -> String {
 mod tests {
     use super::*;
     use crate::camera::data_sheet::Preset;
+    use crate::study::robustness::Answer;
 
     fn result(answer: Answer, named: usize, misnamed: usize) -> FrameResult {
         FrameResult {

@@ -9,72 +9,47 @@ use serde::Serialize;
 
 /// The results of a study.
 #[derive(Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct DefocusReport {
-    /// Version of these fields.
     pub schema: u32,
-    /// What all spots have in common: `peak` or `energy`.
     pub normalisation: &'static str,
-    /// How centroids are measured.
     pub centroid: Centroiding,
-    /// Trials at each point of the grid.
     pub trials: usize,
-    /// Seed of the random numbers.
     pub seed: u64,
-    /// The noise for which radii are reported.
     pub noise: Noise,
-    /// Unit of `noises` and of each `noise` of the stars.
     pub noise_unit: &'static str,
-    /// First and last radius of the grid.
     pub radii_px: [f64; 2],
-    /// Number of radii.
     pub radii: usize,
-    /// First and last noise of the grid.
     pub noises: [f64; 2],
-    /// Number of noises.
     pub noise_count: usize,
-    /// The lens, if there is a camera.
     pub lens: Option<Lens>,
-    /// One report for each star.
     pub stars: Vec<StarReport>,
 }
 
 /// The results of one star. Unless a noise is named they hold at the noise of the study.
 #[derive(Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct StarReport {
-    /// Johnson V, if the star's light is given.
     pub vmag: Option<f64>,
-    /// Brightest pixel as a part of full scale, if that is given.
     pub peak: Option<f64>,
-    /// The radius with the least error.
     pub best: BestRadius,
-    /// The radii that meet each required error.
     pub required: Vec<RequiredError>,
-    /// The camera's spot as it is.
     pub present: Option<SpotRadius>,
-    /// Errors over the radius.
     pub curve: Vec<CurveRow>,
-    /// The best radius at each noise of the grid.
     pub best_by_noise: Vec<BestAtNoise>,
-    /// Best radius over noise, without those at the edge of the grid.
     pub best_as_parabola: Option<Parabola>,
-    /// Lines of equal error.
     pub equal_error: Vec<IsoLine>,
-    /// The surface through the errors.
     pub surface: SurfaceReport,
-    /// Comparison with the closed form, if there is one.
     pub closed_form: Option<ClosedFormReport>,
 }
 
 /// A radius in all units, and its error.
 #[derive(Debug, Clone, Copy, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct SpotRadius {
-    /// In pixels.
     pub radius_px: f64,
-    /// In µm, if there is a lens.
     pub radius_um: Option<f64>,
-    /// Distance from the focus, by geometric blur; none if the spot in focus is wider.
     pub defocus_um: Option<f64>,
-    /// Error of the centroid.
     pub error_px: f64,
 }
 
@@ -92,14 +67,11 @@ pub struct BestRadius {
 
 /// The radii that meet a required error.
 #[derive(Debug, Clone, Copy, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct RequiredError {
-    /// The required error.
     pub required_error_px: f64,
-    /// The smallest radius; none if no radius meets the error.
     pub smallest: Option<SpotRadius>,
-    /// The largest radius; none if no radius meets the error.
     pub largest: Option<SpotRadius>,
-    /// Whether the first and the last radius meet it: smaller or larger ones may as well.
     pub is_at_edge: [bool; 2],
 }
 
@@ -115,30 +87,19 @@ pub struct BestAtNoise {
 
 /// The error at one radius: a row of curve.csv.
 #[derive(Debug, Clone, Copy, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CurveRow {
-    /// Johnson V of the star.
     pub vmag: Option<f64>,
-    /// The radius.
     pub radius_px: f64,
-    /// Measured error, root mean square.
     pub error_px: Option<f64>,
-    /// Its standard error.
     pub error_sigma_px: Option<f64>,
-    /// Stars measured.
     pub trials: usize,
-    /// Stars found.
     pub found: usize,
-    /// Error by the smooth curve.
     pub smooth_error_px: Option<f64>,
-    /// Error by the closed form.
     pub expected_px: Option<f64>,
-    /// The part of it that is due to sampling and to the edge of the window.
     pub bias_px: Option<f64>,
-    /// Cramér-Rao bound of the error.
     pub bound_px: Option<f64>,
-    /// V magnitude at which half of the stars are detected.
     pub limit_vmag: Option<f64>,
-    /// Charge of the brightest pixel over the full well.
     pub peak_of_full_well: Option<f64>,
 }
 

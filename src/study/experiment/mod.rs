@@ -28,7 +28,6 @@ mod text;
 
 pub use published::{Published, PublishedStar};
 pub use report::{ExperimentReport, LimitReport, SCHEMA};
-pub use simulated::ExperimentError;
 pub use summary::{CompletenessBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
 pub use table::{FieldReport, TableReport, TableStar};
 
@@ -37,6 +36,7 @@ use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
 use crate::model::simulate::{Pointing, Scene, Simulator};
 use crate::pipeline::{Context, Solution, Workspace, solve_centroids};
+use crate::study::StudyError;
 use simulated::Simulation;
 
 /// Number of simulated frames, and their seed.
@@ -61,13 +61,13 @@ pub struct Run {
 /// Runs the experiment, its frames on the threads of the current pool; `done` is called after each.
 ///
 /// # Errors
-/// [`ExperimentError`], which does not occur with the paper's cameras.
+/// [`StudyError`], which does not occur with the paper's cameras.
 pub fn run(
     published: &Published,
     indexed: &IndexedCatalog,
     trials: Trials,
     done: &(dyn Fn() + Sync),
-) -> Result<Run, ExperimentError> {
+) -> Result<Run, StudyError> {
     let scenario = Scenario::of(published.preset);
     let budget = Budget::new(&scenario);
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);

@@ -12,38 +12,26 @@ pub const SCHEMA: u32 = 1;
 
 /// The report of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct ExperimentReport {
-    /// [`SCHEMA`].
     pub schema: u32,
-    /// Number of the experiment in the paper.
     pub experiment: u8,
-    /// Date of its frame, ISO 8601, in UTC.
     pub date: String,
-    /// Latitude of the site, in degrees, north positive.
     pub site_lat_deg: f64,
-    /// Longitude of the site, in degrees, east positive.
     pub site_lon_deg: f64,
-    /// Exposure, in seconds.
     pub exposure_s: f64,
-    /// The limiting magnitudes.
     pub limit: LimitReport,
-    /// The stars of the paper's table.
     pub table: TableReport,
-    /// Simulated frames like the paper's; `None` where its stars are not identified, so that the
-    /// pointing is unknown.
     pub simulated: Option<SimulatedReport>,
 }
 
 /// Limiting magnitudes, in V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct LimitReport {
-    /// From the paper's equations.
     pub limit_vmag: f64,
-    /// As printed in the paper.
     pub paper_limit_vmag: f64,
-    /// The faintest star of the paper's table.
     pub paper_faintest_vmag: f64,
-    /// Of this detector, which finds half of the stars of this magnitude.
     pub detector_limit_vmag: f64,
 }
 
@@ -52,14 +40,6 @@ impl ExperimentReport {
     pub fn is_identified(&self) -> bool {
         let all = |simulated: &SimulatedReport| simulated.frames_identified == simulated.frames;
         self.simulated.as_ref().is_some_and(all)
-    }
-
-    /// The report as one line of JSON, without the line's end.
-    ///
-    /// # Errors
-    /// [`serde_json::Error`], which does not occur with these types.
-    pub fn to_json_line(&self) -> Result<String, serde_json::Error> {
-        serde_json::to_string(self)
     }
 }
 

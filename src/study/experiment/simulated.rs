@@ -3,33 +3,16 @@
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::CameraModel;
 use crate::catalog::{Catalog, StarIndex};
-use crate::centroids::CentroidListError;
-use crate::detect::DetectError;
-use crate::frame::{Frame, FrameError};
+use crate::frame::Frame;
 use crate::identify::{Identification, StarMatch};
 use crate::model::sensitivity::{Detector, Faintest, Scenario};
 use crate::model::simulate::{Pointing, Simulator, Truth};
-use crate::pipeline::{Context, Solution, Source, Workspace, solve_frame};
+use crate::pipeline::{Context, Solution, Workspace, solve_frame};
+use crate::study::StudyError;
+use crate::study::trials::{self, is_star_like, random_of};
 use crate::study::validation::LightMap;
 use nalgebra::Vector3;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
-
-/// Why an experiment cannot be run.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExperimentError {
-    /// A frame cannot be simulated.
-    #[error("simulating a frame")]
-    Simulate(#[from] FrameError),
-    /// Stars cannot be detected in a simulated frame.
-    #[error("detecting stars in a simulated frame")]
-    Detect(#[from] DetectError),
-    /// The paper's list is not of its camera.
-    #[error("reading the paper's centroids")]
-    List(#[from] CentroidListError),
-}
+use rand::Rng;
 
 /// Largest shift of the pointing along each axis, in pixels.
 pub(super) const SHIFT_PX: f64 = 0.5;
@@ -83,22 +66,17 @@ impl Simulation<'_> {
         &self,
         frames: u64,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<FrameResult>, ExperimentError> {
-        (0..frames)
-            .into_par_iter()
-            .map_init(Workspace::new, |workspace, number| {
-                let (frame, truth) = self.frame(number)?;
-                let solution = self.solve(&frame, workspace)?;
-                done();
-                Ok(self.evaluate(&truth, &solution, self.context.indexed.catalog()))
-            })
-            .collect()
+    ) -> Result<Vec<FrameResult>, StudyError> {
+        trials::run(frames, done, |number, workspace: &mut Workspace| {
+            let (frame, truth) = self.frame(number)?;
+            let solution = self.solve(&frame, workspace)?;
+            Ok(self.evaluate(&truth, &solution, self.context.indexed.catalog()))
+        })
     }
 
     /// Frame number `number`; its random numbers depend only on the seed and this number.
-    pub(super) fn frame(&self, number: u64) -> Result<(Frame<'static>, Truth), ExperimentError> {
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        random.set_stream(number);
+    pub(super) fn frame(&self, number: u64) -> Result<(Frame<'static>, Truth), StudyError> {
+        let mut random = random_of(self.seed, number);
         let shift_px = [0, 1].map(|_| random.random_range(-SHIFT_PX..SHIFT_PX));
         let pointing = Pointing {
             icrs_to_camera: shifted(self.pointing, self.simulator.camera(), shift_px),
@@ -111,17 +89,16 @@ impl Simulation<'_> {
         &self,
         frame: &Frame,
         workspace: &mut Workspace,
-    ) -> Result<Solution, ExperimentError> {
+    ) -> Result<Solution, StudyError> {
         Ok(solve_frame(frame, self.context, workspace)?)
     }
 
     fn evaluate(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> FrameResult {
         let light = LightMap::of(self.scenario, truth);
-        let star_like = |source: &&Source| source.measured.is_some_and(|m| m.flags.is_star_like());
         let owners: Vec<StarIndex> = solution
             .sources
             .iter()
-            .filter(star_like)
+            .filter(|source| is_star_like(source))
             .filter_map(|source| light.owner(&source.position))
             .filter_map(|star| star.catalog)
             .collect();

@@ -8,74 +8,51 @@ use serde::Serialize;
 
 /// The report of the simulated frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct SimulatedReport {
-    /// Number of simulated frames.
     pub frames: usize,
-    /// Seed of their random numbers.
     pub seed: u64,
-    /// Largest shift of the pointing along x and y, in pixels; uniform.
     pub shift_px: f64,
-    /// Number of identified frames.
     pub frames_identified: usize,
-    /// The faintest identified star, over the frames; `None` where no frame was identified.
     pub faintest: Option<FoundFaintest>,
-    /// The expected faintest star, from the stars on the frames and the detector's completeness.
     pub expected: Option<ExpectedFaintest>,
-    /// The same by the paper's rule: the brightest pixel exceeds the required signal-to-noise
-    /// ratio.
     pub expected_by_brightest_pixel: Option<ExpectedFaintest>,
-    /// Mean number of identified stars on an identified frame.
     pub stars_named: f64,
-    /// Number of stars on all frames identified at the light of another star, or of none.
     pub named_wrongly: usize,
-    /// Number of frames whose faintest identified star is one of these.
     pub faintest_wrong: usize,
-    /// Share of stars found, by magnitude, brightest first.
     pub completeness: Vec<CompletenessBin>,
 }
 
 /// The faintest identified star, over the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct FoundFaintest {
-    /// Mean of its V magnitude.
     pub mean_vmag: f64,
-    /// Standard deviation for one frame.
     pub sigma_mag: f64,
-    /// Its V magnitude on the frame where it is brightest.
     pub least_vmag: f64,
-    /// Its V magnitude on the frame where it is faintest.
     pub most_vmag: f64,
-    /// Mean minus the expected mean.
     pub difference_mag: Option<f64>,
-    /// Its standard error.
     pub difference_sigma_mag: Option<f64>,
 }
 
 /// The expected faintest star of a frame, on average over the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct ExpectedFaintest {
-    /// Its V magnitude.
     pub mean_vmag: f64,
-    /// Standard deviation for one frame.
     pub sigma_mag: f64,
-    /// Number of stars found on a frame.
     pub stars_found: f64,
 }
 
 /// The stars of one magnitude bin on all frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CompletenessBin {
-    /// Brighter end, in V.
     pub from_vmag: f64,
-    /// Fainter end, exclusive.
     pub to_vmag: f64,
-    /// Number of stars.
     pub stars: usize,
-    /// Number of detected stars.
     pub detected: usize,
-    /// Number of identified stars.
     pub named: usize,
-    /// Expected number of detected stars.
     pub expected: f64,
 }
 

@@ -14,59 +14,40 @@ use serde::Serialize;
 
 /// The result of the paper's table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct TableReport {
-    /// Number of stars identified with the paper's number.
     pub right: usize,
-    /// The stars in the paper's order.
     pub stars: Vec<TableStar>,
-    /// The frame's centre, and the quality of the identification; `None` where not identified.
     pub field: Option<FieldReport>,
-    /// Stated zenith distance of the centre, in degrees.
     pub stated_zenith_distance_deg: f64,
-    /// Zenith distance, without refraction, from site, time and centre, in degrees.
     pub zenith_distance_deg: Option<f64>,
-    /// The limit from the paper's equations at that zenith distance, in V, if above the horizon.
     pub limit_there_vmag: Option<f64>,
 }
 
 /// A star of the paper's table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct TableStar {
-    /// Its SKY2000 number in the paper.
     pub paper_id: String,
-    /// The number of the star identified for its centroid.
     pub found_id: Option<String>,
-    /// V magnitude, from the paper.
     pub vmag: f64,
-    /// Column of its centroid, in pixels.
     pub x_px: f64,
-    /// Row of its centroid, in pixels.
     pub y_px: f64,
-    /// Distance between its centroid and its predicted position, in pixels.
     pub residual_px: Option<f64>,
 }
 
 /// The field of the paper's camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct FieldReport {
-    /// Right ascension of the frame's centre, in degrees.
     pub ra_deg: f64,
-    /// Its declination, in degrees.
     pub dec_deg: f64,
-    /// Position angle of image-up there, from north through east, in degrees.
     pub up_pa_deg: f64,
-    /// Pixel scale at the centre, in arcseconds.
     pub pixel_scale_arcsec: f64,
-    /// Whether the image is mirrored.
     pub mirrored: bool,
-    /// Root mean square of the residuals, in pixels.
     pub rms_px: f64,
-    /// log10 of the false-alarm probability.
     pub log10_false_alarm: f64,
-    /// Number of catalogue stars in the rectangle of its centroids that are not fainter than its
-    /// faintest star.
     pub stars_as_bright: usize,
-    /// V magnitude of the brightest of them that is not in the table.
     pub brightest_unlisted_vmag: Option<f64>,
 }
 

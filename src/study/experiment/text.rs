@@ -43,11 +43,7 @@ fn table_text(table: &TableReport) -> String {
         table.right,
         table.stars.len()
     );
-    let _ = writeln!(
-        text,
-        "  {:<15} {:<15} {:>5} {:>8} {:>8} {:>9}",
-        "paper", "found", "V", "x", "y", "residual"
-    );
+    text += "  paper           found               V        x        y  residual\n";
     for star in &table.stars {
         let residual = star
             .residual_px
@@ -176,10 +172,7 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
 
 /// Share of stars found, by magnitude.
 fn completeness_text(simulated: &SimulatedReport) -> String {
-    let mut text = format!(
-        "\n  {:<14} {:>8} {:>9} {:>9} {:>9}\n",
-        "V", "stars", "found", "expected", "named"
-    );
+    let mut text = "\n  V                 stars     found  expected     named\n".to_owned();
     for bin in &simulated.completeness {
         let _ = writeln!(
             text,

@@ -9,7 +9,7 @@ use crate::ephemeris::solar_system::moon_and_sun;
 use crate::model::sensitivity::{Budget, Extinction, SkyBrightness};
 use crate::model::simulate::{Pointing, Scene, Setup, Simulator, camera_of};
 use crate::night::Almanac;
-use crate::study::validation::ValidationError;
+use crate::study::StudyError;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -108,12 +108,12 @@ impl Conditions {
     /// Those of a frame of this camera; `site` is where it is taken.
     ///
     /// # Errors
-    /// [`ValidationError`] if the camera cannot be simulated.
+    /// [`StudyError`] if the camera cannot be simulated.
     pub(super) fn draw(
         setup: &Setup,
         site: Site,
         random: &mut ChaCha8Rng,
-    ) -> Result<Self, ValidationError> {
+    ) -> Result<Self, StudyError> {
         let camera = &setup.scenario.camera;
         let sky_px = 2.0 * camera_of(camera).field_radius_px();
         let (date, almanac) = dark_hour(random, site);
@@ -157,7 +157,7 @@ impl Conditions {
         setup: &Setup,
         site: Site,
         random: &mut ChaCha8Rng,
-    ) -> Result<(), ValidationError> {
+    ) -> Result<(), StudyError> {
         let level = evenly_in_ratio(LEVELS, random);
         let bias = between(BIASES, random);
         let well_e = setup.scenario.camera.full_well_e;
@@ -240,7 +240,7 @@ impl Conditions {
 }
 
 /// Electrons of the mean sky in a pixel, without clouds.
-fn sky_e(setup: &Setup) -> Result<f64, ValidationError> {
+fn sky_e(setup: &Setup) -> Result<f64, StudyError> {
     setup.check()?;
     let simulator = Simulator::new(&setup.scenario, &setup.scene, &[])?;
     Ok(Budget::checked(&simulator.uniform_scenario())?.background_e)

@@ -28,9 +28,8 @@ use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::model::simulate::{Setup, Simulator};
 use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::{Context, Workspace, solve_frame};
-use crate::study::validation::ValidationError;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use crate::study::StudyError;
+use crate::study::trials::random_of;
 use truth::Truth;
 
 /// Simulates and measures skies over one camera.
@@ -49,15 +48,10 @@ impl SkyStudy<'_> {
     /// Simulates the frame with this number, measures it, and compares the result with the truth.
     ///
     /// # Errors
-    /// [`ValidationError::Scenario`], [`ValidationError::Simulate`]; [`ValidationError::Detect`] for an
+    /// [`StudyError::Scenario`], [`StudyError::Simulate`]; [`StudyError::Detect`] for an
     /// unsupported detector size.
-    pub fn run_one(
-        &self,
-        number: u64,
-        workspace: &mut Workspace,
-    ) -> Result<SkyTrial, ValidationError> {
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        random.set_stream(number);
+    pub fn run_one(&self, number: u64, workspace: &mut Workspace) -> Result<SkyTrial, StudyError> {
+        let mut random = random_of(self.seed, number);
         let conditions = Conditions::draw(&self.setup, self.site, &mut random)?;
         let setup = conditions.applied_to(&self.setup, self.site);
         setup.check()?;

@@ -3,7 +3,7 @@
 use super::trial::{CellRow, FrameRow, SkyTrial};
 use crate::base::format::{to_decimals, to_significant};
 use crate::sky::CLEAR_MAG;
-use crate::study::robustness::Answer;
+use crate::study::robustness::Answers;
 use serde::Serialize;
 
 /// Cells with a mean extinction above this are behind clouds,
@@ -68,94 +68,58 @@ const CELL_GROUPS: [(&str, CellBelongs); 8] = [
 
 /// Errors in a group of cells, measured less true.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CellGroup {
-    /// Its name.
     pub group: &'static str,
-    /// Number of cells.
     pub cells: usize,
-    /// Mean error of the brightness, in magnitudes.
     pub brightness_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub brightness_sd_mag: Option<f64>,
-    /// Its pull.
     pub brightness_pull: Option<f64>,
-    /// The same of the extinction by clouds.
     pub clouds_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub clouds_sd_mag: Option<f64>,
-    /// Its pull.
     pub clouds_pull: Option<f64>,
-    /// The same of the limit.
     pub limit_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub limit_sd_mag: Option<f64>,
-    /// Its pull.
     pub limit_pull: Option<f64>,
 }
 
 /// Errors in a group of frames, measured less true; a pull is the root mean square of errors over stated
 /// errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct GroupRow {
-    /// Its name.
     pub group: &'static str,
-    /// Number of frames.
     pub frames: usize,
-    /// Frames identified rightly.
     pub right: usize,
-    /// Frames identified wrongly.
     pub wrong: usize,
-    /// Frames whose sky was measured.
     pub measured: usize,
-    /// Those of them without a brightness.
     pub without_brightness: usize,
-    /// Mean error of the zenith's brightness, in magnitudes.
     pub zenith_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub zenith_sd_mag: Option<f64>,
-    /// Its pull.
     pub zenith_pull: Option<f64>,
-    /// Mean error of the brightness of cells, in magnitudes.
     pub cell_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub cell_sd_mag: Option<f64>,
-    /// Its pull.
     pub cell_pull: Option<f64>,
-    /// Frames whose stars tell the extinction.
     pub extinction_frames: usize,
-    /// Root mean square of its errors, in magnitudes per airmass.
     pub extinction_rms_mag: Option<f64>,
-    /// Its pull.
     pub extinction_pull: Option<f64>,
-    /// Mean over the frames of measured less expected limits in clear cells, in magnitudes.
     pub limit_mean_mag: Option<f64>,
-    /// Its standard deviation.
     pub limit_sd_mag: Option<f64>,
-    /// Root mean square of the errors of the share of clouds.
     pub cloud_share_rms: Option<f64>,
-    /// Its pull.
     pub cloud_share_pull: Option<f64>,
-    /// Area under the curve: how many pairs of a cell behind clouds of more than 0.5 mag and one with less than
-    /// 0.1 mag have probabilities of a clear sky in the right order.
     pub clouds_area: Option<f64>,
 }
 
 /// Cells whose probability of a clear sky is in a tenth of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct ClearTenth {
-    /// From, to.
     pub clear_from: f64,
-    /// To.
     pub clear_to: f64,
-    /// Number of cells.
     pub cells: usize,
-    /// Mean of their probabilities.
     pub mean_clear: f64,
-    /// Mean of the lower and of the upper ends of their bands.
     pub mean_clear_low: f64,
-    /// Of the upper ones.
     pub mean_clear_high: f64,
-    /// Share of the cells with less than 0.2 mag.
     pub share_clear: f64,
 }
 
@@ -184,6 +148,7 @@ impl GroupRow {
         let frames = || trials.iter().map(|trial| &trial.frame);
         let cells = || trials.iter().flat_map(|trial| &trial.cells);
         let count = |holds: Belongs| frames().filter(|row| holds(row)).count();
+        let answers: Answers = frames().map(|row| row.status).collect();
         let zenith = Errors::of(frames().map(|row| {
             let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
             Some((error, row.zenith_sigma_mag?))
@@ -204,8 +169,8 @@ impl GroupRow {
         Self {
             group,
             frames: trials.len(),
-            right: count(|row| row.status == Answer::Right),
-            wrong: count(|row| row.status == Answer::Wrong),
+            right: answers.right,
+            wrong: answers.wrong,
             measured: count(|row| row.measured),
             without_brightness: count(|row| row.no_brightness.is_some()),
             zenith_mean_mag: zenith.mean(),

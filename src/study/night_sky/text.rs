@@ -3,41 +3,30 @@
 use super::summary::{CellGroup, ClearTenth, GroupRow, SkySummary};
 use std::fmt::Write as _;
 
+const GROUPS_HEADING: &str = "Measured less true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.
+
+               frames  right  wrong  measured                 zenith                  cells   extinction, RMS            limit    clouds, RMS    area
+";
+const CELLS_HEADING: &str = "
+cells                               brightness                 clouds                  limit
+";
+const CLEAR_HEADING: &str = "
+Probability of a clear sky against the share of cells with less than 0.2 mag of clouds
+                cells     mean           band    share
+";
+
 impl SkySummary {
     /// The summary as text of several lines.
     pub fn to_text(&self) -> String {
-        let mut text = "Measured less true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.\n\n".to_owned();
-        let _ = writeln!(
-            text,
-            "{:<14} {:>6} {:>6} {:>6} {:>9} {:>22} {:>22} {:>17} {:>16} {:>14} {:>7}",
-            "",
-            "frames",
-            "right",
-            "wrong",
-            "measured",
-            "zenith",
-            "cells",
-            "extinction, RMS",
-            "limit",
-            "clouds, RMS",
-            "area"
-        );
+        let mut text = GROUPS_HEADING.to_owned();
         for row in &self.groups {
             text += &line(row);
         }
-        let _ = writeln!(
-            text,
-            "\n{:<14} {:>8} {:>22} {:>22} {:>22}",
-            "cells", "", "brightness", "clouds", "limit"
-        );
+        text += CELLS_HEADING;
         for row in &self.cells {
             text += &cell_line(row);
         }
-        let _ = writeln!(
-            text,
-            "\nProbability of a clear sky against the share of cells with less than 0.2 mag of clouds\n{:>12} {:>8} {:>8} {:>14} {:>8}",
-            "", "cells", "mean", "band", "share"
-        );
+        text += CLEAR_HEADING;
         for tenth in &self.clear {
             let ClearTenth {
                 clear_from,

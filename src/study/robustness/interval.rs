@@ -2,10 +2,10 @@
 
 use crate::base::statistics::log10_binomial_tail;
 
-/// The level of confidence of an [`Interval`].
-pub const CONFIDENCE: f64 = 0.95;
+/// The level of confidence.
+const CONFIDENCE: f64 = 0.95;
 
-/// A confidence interval of level [`CONFIDENCE`]; both tails have the same probability.
+/// A 95 % confidence interval; both tails have the same probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
     /// Lower end.

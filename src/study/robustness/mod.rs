@@ -20,25 +20,24 @@
 //! Rijlaarsdam, Yous, Byrne, Oddenino, Furano, Moloney 2020, Sensors 20, 2579 (what to report and
 //! to state with it).
 
+mod answers;
 mod centroids;
 mod interval;
 mod protocol;
 mod table;
 mod trial;
 
+pub use answers::Answers;
 pub use centroids::{SimulatedCentroids, random_rotation};
-pub use interval::{CONFIDENCE, Interval};
+pub use interval::Interval;
 pub use protocol::{Mirrored, Protocol};
-pub use table::{
-    Case, CaseResult, STANDARD_FOV_DEG, VARIED_FOV_DEG, VariedParameter, standard_cases,
-};
+pub use table::{Case, CaseResult, VariedParameter, standard_cases};
 pub use trial::{Answer, TrialResult, TrialResults};
 
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::{IndexedCatalog, identify};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
+use crate::pipeline::Workspace;
+use crate::study::trials::{self, random_of};
 use std::time::Instant;
 
 /// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after
@@ -50,15 +49,8 @@ pub fn run(
     seed: u64,
     done: &(dyn Fn() + Sync),
 ) -> TrialResults {
-    let results: Vec<TrialResult> = (0..trials)
-        .into_par_iter()
-        .map(|trial| {
-            let result = run_one(indexed, protocol, seed, trial);
-            done();
-            result
-        })
-        .collect();
-    TrialResults::new(results)
+    let trial = |trial: u64, _: &mut Workspace| run_one(indexed, protocol, seed, trial);
+    TrialResults::new(trials::run(trials, done, trial))
 }
 
 /// Runs only the trial number `trial`.
@@ -68,8 +60,7 @@ pub fn run_one(
     seed: u64,
     trial: u64,
 ) -> TrialResult {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(trial);
+    let mut rng = random_of(seed, trial);
     let centroids = SimulatedCentroids::draw(protocol, indexed, &mut rng);
     let priors = protocol.priors(&mut rng);
     let start = Instant::now();

@@ -1,14 +1,14 @@
 //! The standard table, sweeps over one parameter, and their results.
 
 use super::protocol::{Mirrored, Protocol};
-use super::trial::{Answer, TrialResults};
+use super::trial::TrialResults;
 use crate::identify::Photometry;
 use serde::Serialize;
 
 /// Fields of view of the standard table, in degrees.
-pub const STANDARD_FOV_DEG: [f64; 5] = [2.5, 5.0, 10.0, 20.0, 40.0];
+const STANDARD_FOV_DEG: [f64; 5] = [2.5, 5.0, 10.0, 20.0, 40.0];
 /// The field of view at which the standard table varies other parameters, in degrees.
-pub const VARIED_FOV_DEG: f64 = 10.0;
+const VARIED_FOV_DEG: f64 = 10.0;
 
 /// A protocol with its label in a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,61 +125,35 @@ impl VariedParameter {
     }
 }
 
-/// The result of a case: one row of the table. Rates are in percent; intervals have
-/// [`CONFIDENCE`](super::CONFIDENCE).
+/// The result of a case: one row of the table. Rates are in percent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CaseResult {
-    /// Label of the case.
     pub case: String,
-    /// See [`Protocol::fov_deg`].
     pub fov_deg: f64,
-    /// See [`Protocol::mean_stars`].
     pub mean_stars: f64,
-    /// See [`Protocol::centroid_sigma_px`].
     pub centroid_error_px: f64,
-    /// See [`Protocol::mag_sigma`].
     pub mag_error: f64,
-    /// See [`Protocol::missing`].
     pub missing_percent: f64,
-    /// See [`Protocol::false_stars`].
     pub false_percent: f64,
-    /// See [`Protocol::bright_false_stars`].
     pub bright_false_stars: usize,
-    /// See [`Protocol::scale_error`].
     pub scale_error_percent: Option<f64>,
-    /// See [`Protocol::mirrored`].
     pub mirrored: Mirrored,
-    /// Whether the magnitudes are Johnson V (else fluxes).
     pub johnson_v: bool,
-    /// Minimum number of true stars of a trial that counts in the rates.
     pub least_true_stars: usize,
-    /// Number of trials.
     pub trials: usize,
-    /// Number of trials with enough true stars; the following fields count only these.
     pub counted: usize,
-    /// Identified correctly.
     pub right: usize,
-    /// Identified wrongly.
     pub wrong: usize,
-    /// Not identified.
     pub no_answer: usize,
-    /// Rate of right answers.
     pub right_percent: f64,
-    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// Number of wrong answers in all trials, whatever the number of stars.
     pub wrong_of_all: usize,
-    /// Upper end of the interval of the rate of wrong answers in all trials.
     pub wrong_high_percent: f64,
-    /// Number of identified centroids.
     pub named: usize,
-    /// Number of wrongly identified centroids.
     pub misnamed: usize,
-    /// Median identification time over all trials, in milliseconds.
     pub median_ms: f64,
-    /// 99th percentile of the identification time, in milliseconds.
     pub p99_ms: f64,
 }
 
@@ -188,8 +162,8 @@ impl CaseResult {
     /// in the rates.
     pub fn new(case: &Case, all: &TrialResults, least_true_stars: usize) -> Self {
         let counted = all.with_true_stars(least_true_stars);
-        let right = counted.interval(Answer::Right);
-        let rate = counted.count(Answer::Right) as f64 / counted.trials().max(1) as f64;
+        let (answers, of_all) = (counted.answers(), all.answers());
+        let right = answers.right_interval();
         let (named, misnamed) = counted.names();
         let protocol = &case.protocol;
         Self {
@@ -207,14 +181,14 @@ impl CaseResult {
             least_true_stars,
             trials: all.trials(),
             counted: counted.trials(),
-            right: counted.count(Answer::Right),
-            wrong: counted.count(Answer::Wrong),
-            no_answer: counted.count(Answer::None),
-            right_percent: percent(rate),
+            right: answers.right,
+            wrong: answers.wrong,
+            no_answer: answers.none,
+            right_percent: percent(answers.right_share()),
             right_low_percent: percent(right.low),
             right_high_percent: percent(right.high),
-            wrong_of_all: all.count(Answer::Wrong),
-            wrong_high_percent: percent(all.interval(Answer::Wrong).high),
+            wrong_of_all: of_all.wrong,
+            wrong_high_percent: percent(of_all.wrong_interval().high),
             named,
             misnamed,
             median_ms: milliseconds(all.time_quantile_ms(0.5)),

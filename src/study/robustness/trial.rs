@@ -1,7 +1,7 @@
 //! Results of trials, and their rates.
 
+use super::answers::Answers;
 use super::centroids::SimulatedCentroids;
-use super::interval::Interval;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::base::statistics::quantile;
 use crate::camera::CameraModel;
@@ -105,11 +105,6 @@ impl TrialResults {
         Self { results }
     }
 
-    /// The results, by the number of the trial.
-    pub fn results(&self) -> &[TrialResult] {
-        &self.results
-    }
-
     /// The trials with at least `min` true stars.
     #[must_use]
     pub fn with_true_stars(&self, min: usize) -> Self {
@@ -122,14 +117,9 @@ impl TrialResults {
         self.results.len()
     }
 
-    /// Number of trials with this answer.
-    pub fn count(&self, answer: Answer) -> usize {
-        self.results.iter().filter(|v| v.answer == answer).count()
-    }
-
-    /// Confidence interval of the probability of this answer.
-    pub fn interval(&self, answer: Answer) -> Interval {
-        Interval::of(self.count(answer), self.trials())
+    /// Their answers.
+    pub fn answers(&self) -> Answers {
+        self.results.iter().map(|result| result.answer).collect()
     }
 
     /// Numbers of identified and of wrongly identified centroids.

@@ -12,8 +12,9 @@ use crate::model::sensitivity::{CramerRao, Faintest};
 use crate::model::simulate::TrueStar;
 use crate::photometry::comparison::{expected_zero_point_vmag, fitted_color_effect_mag};
 use crate::photometry::{SUN_BV_MAG, filter_response};
-use crate::pipeline::{Note, Outcome, Solution, Source};
+use crate::pipeline::{Note, Outcome, Solution};
 use crate::study::robustness::Answer;
+use crate::study::trials::is_star_like;
 use std::collections::{HashMap, HashSet};
 
 pub(super) struct Evaluation<'a> {
@@ -389,10 +390,6 @@ impl<'a> Evaluation<'a> {
             ..FrameRecord::default()
         })
     }
-}
-
-fn is_star_like(source: &Source) -> bool {
-    source.measured.is_some_and(|m| m.flags.is_star_like())
 }
 
 fn significant(value: f64) -> f64 {

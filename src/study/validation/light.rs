@@ -2,6 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::base::neighbors::PointTree;
+use crate::detect::PIXEL_VARIANCE_PX2;
 use crate::model::sensitivity::Scenario;
 use crate::model::simulate::{TrueStar, Truth};
 
@@ -15,8 +16,6 @@ pub struct LightMap<'a> {
 impl<'a> LightMap<'a> {
     /// The light of the stars on a frame and just outside it.
     pub fn of(scenario: &Scenario, truth: &'a Truth) -> Self {
-        /// Variance of a uniform distribution over a pixel.
-        const PIXEL_VARIANCE_PX2: f64 = 1.0 / 12.0;
         let variance_px2 = scenario.camera.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
         let smear_px2 = truth
             .motion_px

@@ -36,16 +36,17 @@ mod validator;
 
 pub use light::LightMap;
 pub use parameter_study::{StudyParameter, StudyRow};
-pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
+pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord, TableRow};
 pub use suite::{HARD_SUITE, HardCase, HardRow};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,
     CompletenessSummary, DetectionSummary, DifferenceSummary, Histogram, IdentificationBin,
     IdentificationSummary, Pull, PullSummary, Quantiles, RunFacts, Summary,
 };
-pub use validator::{Protocol, ValidationError, Validator, draw};
+pub use validator::{Protocol, Validator, draw};
 
 use crate::pipeline::{Workspace, solve_frame};
+use crate::study::StudyError;
 use evaluation::Evaluation;
 use std::time::Instant;
 
@@ -66,12 +67,12 @@ impl Validator<'_> {
     /// Simulates the frame with this number, processes it, and compares the result with the truth.
     ///
     /// # Errors
-    /// [`ValidationError::Simulate`], [`ValidationError::Detect`] for an unsupported detector size.
+    /// [`StudyError::Simulate`], [`StudyError::Detect`] for an unsupported detector size.
     pub fn run_one(
         &self,
         number: u64,
         workspace: &mut Workspace,
-    ) -> Result<ValidatedFrame, ValidationError> {
+    ) -> Result<ValidatedFrame, StudyError> {
         let start = Instant::now();
         let simulated = self.simulate(number)?;
         let simulate_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -7,7 +7,6 @@ use crate::camera::focal_length_px;
 use crate::model::sensitivity::{Spacing, UnknownParameter};
 use crate::model::simulate::{Setup, SetupParameter};
 use serde::Serialize;
-use std::fmt::Write as _;
 
 /// What a study varies.
 #[derive(Debug, Clone, Copy)]
@@ -65,74 +64,41 @@ impl StudyParameter {
 
 /// The results of a run at one value of the parameter.
 #[derive(Debug, Clone, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct StudyRow {
-    /// Name of the parameter.
     pub parameter: &'static str,
-    /// Its value.
     pub value: f64,
-    /// Frames.
     pub frames: usize,
-    /// Frames identified correctly.
     pub right: usize,
-    /// Frames without an answer.
     pub none: usize,
-    /// Frames identified wrongly.
     pub wrong: usize,
-    /// Rate of correct answers.
     pub right_percent: f64,
-    /// Lower end of its 95 % interval.
     pub right_low_percent: f64,
-    /// Upper end of its 95 % interval.
     pub right_high_percent: f64,
-    /// Upper end of the 95 % interval of the rate of wrong answers.
     pub wrong_high_percent: f64,
-    /// Detections that may be stars.
     pub detected: u64,
-    /// Detections that were named.
     pub named: u64,
-    /// Detections with a wrong name.
     pub misnamed: u64,
-    /// Those of them that were named as another star at the same place.
     pub misnamed_companions: u64,
-    /// False detections in a million pixels.
     pub false_per_mpx: f64,
-    /// Lower end of its 95 % interval.
     pub false_low_per_mpx: f64,
-    /// Upper end of its 95 % interval.
     pub false_high_per_mpx: f64,
-    /// V magnitude at which half of the stars should be detected.
     pub predicted_limit_vmag: f64,
-    /// V magnitude at which half of the stars are detected.
     pub measured_limit_vmag: Option<f64>,
-    /// Its standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// Measured minus predicted limit.
     pub limit_difference_mag: Option<f64>,
-    /// Root mean square of the errors of centroids over their Cramér-Rao bound.
     pub centroid_ratio: Option<f64>,
-    /// Its standard error.
     pub centroid_ratio_sigma: Option<f64>,
-    /// Median error of the boresight.
     pub boresight_p50_arcsec: Option<f64>,
-    /// Its 95th percentile.
     pub boresight_p95_arcsec: Option<f64>,
-    /// Median error of the roll.
     pub roll_p50_arcsec: Option<f64>,
-    /// Its 95th percentile.
     pub roll_p95_arcsec: Option<f64>,
-    /// Mean of the squared error of the attitude in units of its covariance; 3 if that is correct.
     pub nees_mean: Option<f64>,
-    /// Its standard error.
     pub nees_sigma: Option<f64>,
-    /// Standard deviation of the errors of x over their stated errors.
     pub pull_x_sd: f64,
-    /// The same of y.
     pub pull_y_sd: f64,
-    /// The same of the light.
     pub pull_flux_sd: f64,
-    /// Mean of the faintest star named minus the faintest expected.
     pub faintest_difference_mag: f64,
-    /// Its standard error.
     pub faintest_difference_sigma_mag: f64,
     /// Title of an axis of the parameter.
     #[serde(skip)]
@@ -195,7 +161,7 @@ impl StudyRow {
     pub fn to_text(rows: &[Self]) -> String {
         let mut text = String::new();
         for rows in rows.chunk_by(|a, b| a.parameter == b.parameter) {
-            text += &heading(rows[0].parameter);
+            text += &format!("{:>26}{HEADING}", rows[0].parameter);
             for row in rows {
                 text += &row.line();
             }
@@ -229,63 +195,10 @@ impl StudyRow {
     }
 }
 
-fn heading(parameter: &str) -> String {
-    let lines = [
-        [
-            parameter,
-            "frames",
-            "right",
-            "none",
-            "wrong",
-            "right %",
-            "95 %",
-            "limit",
-            "minus",
-            "ratio to",
-            "boresight",
-            "95 %",
-            "NEES",
-        ],
-        [
-            "",
-            "",
-            "",
-            "",
-            "",
-            "",
-            "",
-            "V",
-            "expected",
-            "bound",
-            "off ″, 50",
-            "",
-            "of 3",
-        ],
-    ];
-    let mut text = String::new();
-    for [
-        name,
-        frames,
-        right,
-        none,
-        wrong,
-        rate,
-        interval,
-        limit,
-        off,
-        ratio,
-        p50,
-        p95,
-        nees,
-    ] in lines
-    {
-        let _ = writeln!(
-            text,
-            "{name:>26} {frames:>7} {right:>7} {none:>6} {wrong:>6} {rate:>8} {interval:>19} {limit:>8} {off:>8} {ratio:>9} {p50:>9} {p95:>7} {nees:>7}"
-        );
-    }
-    text
-}
+/// The heading of the rows, after the name of the parameter.
+const HEADING: &str = "  frames   right   none  wrong  right %                95 %    limit    minus  ratio to boresight    95 %    NEES
+                                                                                             V expected     bound off ″, 50            of 3
+";
 
 #[cfg(test)]
 mod tests {

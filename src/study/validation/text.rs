@@ -5,6 +5,16 @@ use super::summary::{
 };
 use std::fmt::Write as _;
 
+const CENTROIDS_HEADING: &str = "
+Centroids of isolated stars that are not saturated, errors on one axis
+              SNR     stars     rms px   bound px           ratio  stated px    light  its ratio
+";
+const PULLS_HEADING: &str = "
+Pulls: errors in units of their stated standard errors
+                    values      mean       sd  beyond 2  beyond 3  beyond 5
+  where true                       0        1    4.55 %    0.27 %    0.00 %
+";
+
 impl Summary {
     /// The summary as text of several lines, each with a line end.
     pub fn to_text(&self) -> String {
@@ -45,11 +55,7 @@ impl Summary {
             all.wrong,
             all.wrong_high_percent + 0.005,
         );
-        let _ = writeln!(
-            text,
-            "  {:<22} {:>8} {:>8} {:>6} {:>6} {:>9} {:>19}",
-            "stars above the limit", "frames", "right", "none", "wrong", "right", "95 %"
-        );
+        text += "  stars above the limit    frames    right   none  wrong     right                95 %\n";
         for bin in &self.identification.by_stars {
             text += &identification_line(bin);
         }
@@ -97,11 +103,7 @@ impl Summary {
                  difference {difference:+.3} mag"
             );
         }
-        let _ = writeln!(
-            text,
-            "  {:>7} {:>9} {:>9} {:>10} {:>17} {:>10}",
-            "V", "stars", "found", "measured", "95 %", "predicted"
-        );
+        text += "        V     stars     found   measured              95 %  predicted\n";
         for bin in &c.bins {
             let interval = format!("{:.3} to {:.3}", bin.low, bin.high);
             let _ = writeln!(
@@ -114,10 +116,7 @@ impl Summary {
     }
 
     fn centroids_text(&self) -> String {
-        let mut text = format!(
-            "\nCentroids of isolated stars that are not saturated, errors on one axis\n  {:>15} {:>9} {:>10} {:>10} {:>15} {:>10} {:>8} {:>10}\n",
-            "SNR", "stars", "rms px", "bound px", "ratio", "stated px", "light", "its ratio"
-        );
+        let mut text = CENTROIDS_HEADING.to_owned();
         for bin in &self.centroids.bins {
             let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
             let bound = or_dash(bin.bound_px.map(|px| format!("{px:.5}")));
@@ -138,23 +137,7 @@ impl Summary {
     }
 
     fn pulls_text(&self) -> String {
-        let mut text = format!(
-            "\nPulls: errors in units of their stated standard errors\n  {:<14} {:>9} {:>9} {:>8} {:>9} {:>9} {:>9}\n  {:<14} {:>9} {:>9} {:>8} {:>9} {:>9} {:>9}\n",
-            "",
-            "values",
-            "mean",
-            "sd",
-            "beyond 2",
-            "beyond 3",
-            "beyond 5",
-            "where true",
-            "",
-            "0",
-            "1",
-            "4.55 %",
-            "0.27 %",
-            "0.00 %"
-        );
+        let mut text = PULLS_HEADING.to_owned();
         for (name, pull) in self.pulls.named() {
             let _ = writeln!(
                 text,
@@ -243,8 +226,8 @@ fn identification_line(bin: &IdentificationBin) -> String {
 
 fn attitude_text(attitude: &AttitudeSummary) -> String {
     let mut text = format!(
-        "\nAttitude, of {} frames\n  {:<18} {:>9} {:>9} {:>9} {:>9} {:>9}\n",
-        attitude.frames, "arcseconds", "50 %", "68.3 %", "95 %", "99 %", "all"
+        "\nAttitude, of {} frames\n  arcseconds              50 %    68.3 %      95 %      99 %       all\n",
+        attitude.frames
     );
     let mut line = |name: &str, q: &Quantiles| {
         let _ = writeln!(

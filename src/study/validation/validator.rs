@@ -4,36 +4,19 @@ use super::summary::RunFacts;
 use super::theory::Theory;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
-use crate::detect::{DetectConfig, DetectError};
+use crate::detect::DetectConfig;
 use crate::ephemeris::observer::Site;
 use crate::ephemeris::places::StarPlaces;
-use crate::frame::{Frame, FrameError};
+use crate::frame::Frame;
 use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
-use crate::model::sensitivity::{Budget, Detector, Rule, ScenarioError};
+use crate::model::sensitivity::{Budget, Detector, Rule};
 use crate::model::simulate::{Pointing, Setup, Simulator, Truth};
 use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::Context;
+use crate::study::StudyError;
 use crate::study::robustness::random_rotation;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
-/// Why a validation is impossible.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ValidationError {
-    /// The scenario is invalid.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// There is no limit: noise alone is detected more often than not.
-    #[error("there is no limiting magnitude: noise alone is detected at half of all places")]
-    NoLimit,
-    /// The frame cannot be simulated.
-    #[error("simulating a frame")]
-    Simulate(#[from] FrameError),
-    /// The frame cannot be processed.
-    #[error("detecting stars in a simulated frame")]
-    Detect(#[from] DetectError),
-}
+use crate::study::trials::random_of;
+use rand::Rng;
 
 /// What is simulated, and what the pipeline knows about it.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,8 +52,7 @@ pub(super) struct SimulatedFrame {
 
 /// Pixel seed and attitude of the frame with this number, in a run with this `seed`.
 pub fn draw(seed: u64, number: u64) -> (u64, Rotation<Icrs, Camera>) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(number);
+    let mut random = random_of(seed, number);
     let icrs_to_camera = random_rotation(&mut random);
     (random.random(), icrs_to_camera)
 }
@@ -92,11 +74,8 @@ impl<'a> Validator<'a> {
     /// Prepares what all frames have in common.
     ///
     /// # Errors
-    /// [`ValidationError::Scenario`]; [`ValidationError::NoLimit`] if there is no limit to predict.
-    pub fn new(
-        indexed: &'a IndexedCatalog<'a>,
-        protocol: &Protocol,
-    ) -> Result<Self, ValidationError> {
+    /// [`StudyError::Scenario`]; [`StudyError::NoLimit`] if there is no limit to predict.
+    pub fn new(indexed: &'a IndexedCatalog<'a>, protocol: &Protocol) -> Result<Self, StudyError> {
         let Setup { scenario, scene } = &protocol.setup;
         protocol.setup.check()?;
         let simulator = Simulator::new(scenario, scene, indexed.catalog().stars())?;
@@ -104,7 +83,7 @@ impl<'a> Validator<'a> {
         let budget = Budget::checked(scenario)?;
         let detector = Detector::new(Rule::MatchedFilter, scenario, &budget);
         if !detector.vmag_at(0.5).is_finite() {
-            return Err(ValidationError::NoLimit);
+            return Err(StudyError::NoLimit);
         }
         let sheet = &scenario.camera;
         let camera = protocol.scale_known.then(|| ObservingSetup {
@@ -164,13 +143,13 @@ impl<'a> Validator<'a> {
     /// The frame with this number, to look at.
     ///
     /// # Errors
-    /// [`ValidationError::Simulate`].
-    pub fn frame(&self, number: u64) -> Result<Frame<'static>, ValidationError> {
+    /// [`StudyError::Simulate`].
+    pub fn frame(&self, number: u64) -> Result<Frame<'static>, StudyError> {
         Ok(self.simulate(number)?.frame)
     }
 
     /// Simulates the frame with this number.
-    pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, ValidationError> {
+    pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, StudyError> {
         let (seed, drawn) = self.draw(number);
         let places = self.places;
         let zenith = places.zenith();

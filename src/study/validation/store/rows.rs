@@ -1,7 +1,7 @@
 //! Reading the rows of a table.
 
-use super::columns::TableRow;
 use super::error::StoreError;
+use crate::study::validation::record::TableRow;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Take};
 use std::marker::PhantomData;

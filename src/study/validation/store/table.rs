@@ -1,8 +1,8 @@
 //! One table as a CSV file that grows.
 
-use super::columns::TableRow;
 use super::error::StoreError;
 use super::rows::Rows;
+use crate::study::validation::record::TableRow;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;

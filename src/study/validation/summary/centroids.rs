@@ -25,28 +25,18 @@ pub struct CentroidSummary {
 
 /// A bin of SNR. Position errors are on one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CentroidBin {
-    /// Lower end of the SNR.
     pub from_snr: f64,
-    /// Upper end of the SNR, exclusive.
     pub to_snr: f64,
-    /// Mean SNR.
     pub snr: f64,
-    /// Number of detected stars.
     pub stars: usize,
-    /// RMS error of x and y.
     pub rms_px: f64,
-    /// RMS Cramér-Rao bound; none for smeared spots.
     pub bound_px: Option<f64>,
-    /// RMS error over bound.
     pub ratio: Option<f64>,
-    /// Standard error of that ratio for Gaussian errors.
     pub ratio_sigma: Option<f64>,
-    /// RMS stated standard error.
     pub stated_px: f64,
-    /// Mean measured over true flux.
     pub flux_part: f64,
-    /// RMS error of the flux over its bound.
     pub flux_ratio: Option<f64>,
 }
 

@@ -15,37 +15,26 @@ const BIN_MAG: f64 = 0.1;
 /// The limits are those of a normal distribution function, fitted to the detections and, in the
 /// same way, to the predicted probabilities. Deviations from that form cancel in the difference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CompletenessSummary {
-    /// V magnitude of 50 % completeness, by the model itself.
     pub predicted_limit_vmag: f64,
-    /// V magnitude of 50 % completeness, by a fit to the predicted probabilities.
     pub predicted_fit_vmag: Option<f64>,
-    /// V magnitude of 50 % completeness, by a fit to the detections; none with too few stars.
     pub measured_limit_vmag: Option<f64>,
-    /// Its standard error.
     pub measured_limit_sigma_mag: Option<f64>,
-    /// Measured minus predicted limit, both fitted.
     pub difference_mag: Option<f64>,
-    /// Bins, brightest first, without empty ones.
     pub bins: Vec<CompletenessBin>,
 }
 
 /// A bin of magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CompletenessBin {
-    /// Mean V magnitude of its stars.
     pub vmag: f64,
-    /// Number of stars.
     pub stars: usize,
-    /// Number of detected stars.
     pub detected: usize,
-    /// Detected fraction.
     pub measured: f64,
-    /// Lower end of its 95 % interval.
     pub low: f64,
-    /// Upper end of its 95 % interval.
     pub high: f64,
-    /// Mean predicted probability.
     pub predicted: f64,
 }
 

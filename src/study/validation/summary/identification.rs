@@ -1,7 +1,7 @@
 //! Rates of right, wrong and no identification.
 
 use crate::base::format::to_decimals;
-use crate::study::robustness::{Answer, Interval};
+use crate::study::robustness::{Answer, Answers};
 use serde::Serialize;
 
 /// Lower ends of the bins, in stars brighter than the limit.
@@ -20,79 +20,64 @@ pub struct IdentificationSummary {
 
 /// Frames by number of stars.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct IdentificationBin {
-    /// Lower end of the number of stars brighter than the predicted limit.
     pub from_stars: u64,
-    /// Upper end, inclusive.
     pub to_stars: u64,
-    /// Number of frames.
     pub frames: usize,
-    /// Correctly identified frames.
     pub right: usize,
-    /// Wrongly identified frames.
     pub wrong: usize,
-    /// Frames without identification.
     pub none: usize,
-    /// Percentage of right answers.
     pub right_percent: f64,
-    /// Lower end of its interval.
     pub right_low_percent: f64,
-    /// Upper end of its interval.
     pub right_high_percent: f64,
-    /// Upper end of the interval of wrong answers.
     pub wrong_high_percent: f64,
 }
 
 impl IdentificationBin {
-    fn new([from_stars, to_stars]: [u64; 2], [right, wrong, none]: [usize; 3]) -> Self {
-        let frames = right + wrong + none;
-        let percent = |part: f64| to_decimals(100.0 * part, 4);
-        let interval = Interval::of(right, frames);
+    fn new([from_stars, to_stars]: [u64; 2], answers: Answers) -> Self {
+        let percent = |share: f64| to_decimals(100.0 * share, 4);
+        let interval = answers.right_interval();
         Self {
             from_stars,
             to_stars,
-            frames,
-            right,
-            wrong,
-            none,
-            right_percent: percent(right as f64 / frames.max(1) as f64),
+            frames: answers.all(),
+            right: answers.right,
+            wrong: answers.wrong,
+            none: answers.none,
+            right_percent: percent(answers.right_share()),
             right_low_percent: percent(interval.low),
             right_high_percent: percent(interval.high),
-            wrong_high_percent: percent(Interval::of(wrong, frames).high),
+            wrong_high_percent: percent(answers.wrong_interval().high),
         }
     }
 }
 
-/// Counts of answers.
+/// Answers by the number of stars.
 #[derive(Default)]
 pub(super) struct Identifications {
-    counts: [[usize; 3]; FROM_STARS.len()],
+    all: Answers,
+    by_stars: [Answers; FROM_STARS.len()],
     most_stars: u64,
 }
 
 impl Identifications {
     pub(super) fn add(&mut self, stars: u64, answer: Answer) {
         let bin = FROM_STARS.partition_point(|from| *from <= stars) - 1;
-        let which = match answer {
-            Answer::Right => 0,
-            Answer::Wrong => 1,
-            Answer::None => 2,
-        };
-        self.counts[bin][which] += 1;
+        self.all.add(answer);
+        self.by_stars[bin].add(answer);
         self.most_stars = self.most_stars.max(stars);
     }
 
     pub(super) fn finish(self) -> IdentificationSummary {
-        let all = (0..3).map(|which| self.counts.iter().map(|bin| bin[which]).sum());
-        let all: Vec<usize> = all.collect();
-        let bin = |(bin, counts): (usize, &[usize; 3])| {
+        let bin = |(bin, answers): (usize, &Answers)| {
             let next = FROM_STARS.get(bin + 1).map(|from| from - 1);
             let to_stars = next.unwrap_or(self.most_stars);
-            IdentificationBin::new([FROM_STARS[bin], to_stars], *counts)
+            IdentificationBin::new([FROM_STARS[bin], to_stars], *answers)
         };
-        let bins = self.counts.iter().enumerate().map(bin);
+        let bins = self.by_stars.iter().enumerate().map(bin);
         IdentificationSummary {
-            all: IdentificationBin::new([0, self.most_stars], [all[0], all[1], all[2]]),
+            all: IdentificationBin::new([0, self.most_stars], self.all),
             by_stars: bins.filter(|bin| bin.frames > 0).collect(),
         }
     }

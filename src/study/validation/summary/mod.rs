@@ -87,66 +87,44 @@ pub struct Summary {
 
 /// Numbers of detections and names.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct DetectionSummary {
-    /// Star-like detections.
     pub detected: u64,
-    /// Rejected detections.
     pub rejected: u64,
-    /// Detections with the light of several stars, none of which contributes more than half.
     pub blends: u64,
-    /// Stars that were detected as several.
     pub split: u64,
-    /// Named detections.
     pub named: u64,
-    /// Named detections that are another star, or none.
     pub misnamed: u64,
-    /// Misnamed detections whose name is that of another star at the same position.
     pub misnamed_companions: u64,
-    /// Star-like detections without the light of any star.
     pub false_detections: u64,
-    /// False detections per million pixels.
     pub false_per_mpx: f64,
-    /// Lower end of its 95 % interval.
     pub false_low_per_mpx: f64,
-    /// Upper end of its 95 % interval.
     pub false_high_per_mpx: f64,
 }
 
 /// Errors of the attitude.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct AttitudeSummary {
-    /// Correctly identified frames.
     pub frames: usize,
-    /// Direction error of the boresight.
     pub boresight_arcsec: Quantiles,
-    /// Rotation error about the boresight.
     pub roll_arcsec: Quantiles,
-    /// Percentiles 0 to 100 of the boresight error.
     pub boresight_percentiles_arcsec: Vec<f64>,
-    /// Percentiles 0 to 100 of the roll error.
     pub roll_percentiles_arcsec: Vec<f64>,
-    /// RMS rotations about x, y and the boresight.
     pub rms_arcsec: [f64; 3],
-    /// Mean normalised squared error (NEES): 3 if the stated covariance is right.
     pub nees_mean: f64,
-    /// Standard error of that mean if the covariance is right.
     pub nees_sigma: f64,
-    /// RMS residual, averaged over frames.
     pub rms_px: f64,
 }
 
 /// Quantiles of a distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct Quantiles {
-    /// Median.
     pub p50: f64,
-    /// 68.3 %.
     pub p68: f64,
-    /// 95 %.
     pub p95: f64,
-    /// 99 %.
     pub p99: f64,
-    /// Maximum.
     pub max: f64,
 }
 

@@ -6,45 +6,30 @@ use serde::Serialize;
 /// Pulls: errors in units of their stated standard errors. If those are right, a pull has mean 0,
 /// standard deviation 1, and 4.55 % beyond 2.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct PullSummary {
-    /// Of x, for isolated, unsaturated stars with a detection probability of 99 % or more.
     pub x: Pull,
-    /// Of y.
     pub y: Pull,
-    /// Of the flux.
     pub flux: Pull,
-    /// Of the rotation about x.
     pub attitude_x: Pull,
-    /// Of the rotation about y.
     pub attitude_y: Pull,
-    /// Of the rotation about the boresight.
     pub roll: Pull,
-    /// Of the focal length.
     pub focal_length: Pull,
-    /// Of the photometric zero point.
     pub zero_point: Pull,
-    /// Of the proportionality of grey levels and light.
     pub linearity: Pull,
-    /// Of the limit measured on a frame, against the predicted one.
     pub frame_limit: Pull,
 }
 
 /// Statistics of one pull.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct Pull {
-    /// Number of values.
     pub count: usize,
-    /// Mean.
     pub mean: f64,
-    /// Standard deviation.
     pub sd: f64,
-    /// Percentage of values beyond ±2.
     pub beyond_2_percent: f64,
-    /// Percentage of values beyond ±3.
     pub beyond_3_percent: f64,
-    /// Percentage of values beyond ±5.
     pub beyond_5_percent: f64,
-    /// Histogram.
     pub histogram: Histogram,
 }
 
@@ -61,18 +46,13 @@ pub struct Histogram {
 
 /// Statistics of measured minus expected values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct DifferenceSummary {
-    /// Number of frames with a value.
     pub count: usize,
-    /// Mean.
     pub mean: f64,
-    /// Standard error of the mean, from the scatter.
     pub mean_sigma: f64,
-    /// Standard deviation.
     pub sd: f64,
-    /// Expected standard deviation, if known.
     pub expected_sd: Option<f64>,
-    /// Histogram.
     pub histogram: Histogram,
 }
 

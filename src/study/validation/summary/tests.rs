@@ -1,5 +1,4 @@
 use super::*;
-use crate::study::validation::Named;
 
 fn facts() -> RunFacts {
     RunFacts {
@@ -18,11 +17,7 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
     FrameRecord {
         frame: number,
         seed: number,
-        ra_deg: 0.0,
-        dec_deg: 0.0,
-        up_pa_deg: 0.0,
         status,
-        reason: None,
         stars_above_limit: 5 + 10 * number,
         detected: 12,
         rejected: 1,
@@ -31,7 +26,6 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
         misnamed_companions: number / 2,
         false_detections: 1,
         blends: 2,
-        star_rows: 0,
         error_x_arcsec: of_right(x),
         error_y_arcsec: of_right(y),
         error_roll_arcsec: of_right(roll),
@@ -58,6 +52,7 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
         linearity: of_right(0.98),
         linearity_sigma: of_right(0.02),
         notes: (number > 0).then(|| "not_linear large_residuals".to_owned()),
+        ..FrameRecord::default()
     }
 }
 
@@ -65,11 +60,7 @@ fn frame(number: u64, status: Answer, errors: [f64; 3]) -> FrameRecord {
 /// error of 0.05 px.
 fn star(vmag: f64, snr: f64, off: f64) -> StarRecord {
     StarRecord {
-        frame: 0,
-        kind: RowKind::Star,
-        id: Some("1".to_owned()),
         vmag: Some(vmag),
-        bv_mag: None,
         true_x_px: Some(100.0),
         true_y_px: Some(200.0),
         true_flux_e: Some(1000.0),
@@ -87,7 +78,7 @@ fn star(vmag: f64, snr: f64, off: f64) -> StarRecord {
         sigma_y: Some(0.05),
         flux_e: Some(1100.0),
         sigma_flux_e: Some(50.0),
-        named: Named::Right,
+        ..StarRecord::default()
     }
 }
 

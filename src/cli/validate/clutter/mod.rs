@@ -1,18 +1,16 @@
-//! `clutter`: frames with more than stars in them, and pictures of no sky.
+//! The suite of clutter: frames with more than stars in them, and pictures of no sky.
 
 mod args;
 mod pictures;
 
 pub(crate) use args::ClutterArgs;
 
-use super::exit::{CommandError, Outcome};
-use super::options::format::Format;
-use super::output::rows::{csv_table, json_lines};
-use super::progress::frames_bar_with_speed;
+use crate::cli::exit::{CommandError, Outcome};
+use crate::cli::progress::frames_bar_with_speed;
 use starpipe::model::simulate::Setup;
 use starpipe::study::clutter::{KindResult, Protocol, run};
 
-/// `starpipe clutter`
+/// `starpipe validate --suite clutter`
 pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> {
     let kinds = &arguments.kinds.0;
     let setups = arguments.setup.setups()?;
@@ -46,17 +44,13 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
         progress.finish_and_clear();
         tables
     })?;
-    let rows = || tables.iter().flat_map(|table| &table.rows);
-    let outcome = Outcome::success(match arguments.format {
-        Format::Text => tables
-            .iter()
-            .map(Table::to_text)
-            .collect::<Vec<_>>()
-            .join("\n"),
-        Format::Json => json_lines(rows())?,
-        Format::Csv => csv_table(rows())?,
-    });
-    Ok(outcome.if_written(all_written))
+    let text = || {
+        let texts: Vec<String> = tables.iter().map(Table::to_text).collect();
+        texts.join("\n")
+    };
+    let rows = tables.iter().flat_map(|table| &table.rows);
+    let text = arguments.format.of_rows(text, rows)?;
+    Ok(Outcome::success(text).if_written(all_written))
 }
 
 /// The results of one camera.

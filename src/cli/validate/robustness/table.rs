@@ -6,20 +6,8 @@ use starpipe::study::robustness::CaseResult;
 
 /// The table with what its rows have in common.
 pub(super) fn text(arguments: &RobustnessArgs, rows: &[SweptRow]) -> String {
-    let mut text = format!(
-        "{}{:<28} {:>8} {:>8} {:>6} {:>6} {:>9} {:>17} {:>7} {:>9} {:>9}\n",
-        introduction(arguments),
-        "",
-        "counted",
-        "right",
-        "none",
-        "wrong",
-        "right",
-        "95 %",
-        "wrong",
-        "median",
-        "99 %"
-    );
+    const HEADING: &str = "                              counted    right   none  wrong     right              95 %   wrong    median      99 %\n";
+    let mut text = introduction(arguments) + HEADING;
     for SweptRow { row, .. } in rows {
         text += &line(row);
     }

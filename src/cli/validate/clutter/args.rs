@@ -1,4 +1,4 @@
-//! The options of `clutter`.
+//! The options of the suite of clutter.
 
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::Format;
@@ -8,12 +8,13 @@ use starpipe::study::clutter::Kind;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
+#[command(override_usage = "starpipe validate --suite clutter [OPTIONS]")]
 #[command(mut_group("simulated", |cameras| cameras.required(false)))]
 #[command(after_help = "Examples:\n  \
-    starpipe clutter --kinds blends,trails --count 20\n  \
-    starpipe clutter --preset imx174-35mm\n  \
-    starpipe clutter --camera camera.toml --kinds sky --count 250 --format csv > clutter.csv\n  \
-    starpipe clutter --preset imx174-35mm --kinds foliage,jpeg --count 5 --pictures pictures\n\n\
+    starpipe validate --suite clutter --kinds blends,trails --count 20\n  \
+    starpipe validate --suite clutter --preset imx174-35mm\n  \
+    starpipe validate --suite clutter --camera camera.toml --kinds sky --count 250 --format csv > clutter.csv\n  \
+    starpipe validate --suite clutter --preset imx174-35mm --kinds foliage,jpeg --count 5 --pictures pictures\n\n\
     Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
     processed with nothing known beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
     Without --camera or --preset, every built-in camera is simulated in turn.\n\

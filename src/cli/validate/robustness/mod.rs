@@ -1,5 +1,4 @@
-//! `robustness`: measures how often identification is right, wrong or fails, on simulated lists of
-//! centroids.
+//! The suite of robustness: how often identification is right, wrong or fails, on simulated lists of centroids.
 
 mod args;
 mod figure;
@@ -9,14 +8,12 @@ mod table;
 
 pub(crate) use args::RobustnessArgs;
 
-use super::exit::{CommandError, Outcome};
-use super::options::format::Format;
-use super::output::files::write_each;
-use super::output::rows::{csv_table, json_lines};
+use crate::cli::exit::{CommandError, Outcome};
+use crate::cli::output::files::write_each;
 use anyhow::Context;
 use figure::RateTable;
 
-/// `starpipe robustness`
+/// `starpipe validate --suite robustness`
 pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Outcome, CommandError> {
     let rows = rows::run_all(arguments)?;
     let plot = arguments.plot.as_ref().map(|plot| {
@@ -28,10 +25,8 @@ pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Outcome, CommandE
     });
     let all_written = write_each(plot);
     let table = rows.iter().map(|swept| &swept.row);
-    let outcome = Outcome::success(match arguments.format {
-        Format::Text => table::text(arguments, &rows),
-        Format::Json => json_lines(table)?,
-        Format::Csv => csv_table(table)?,
-    });
-    Ok(outcome.if_written(all_written))
+    let text = arguments
+        .format
+        .of_rows(|| table::text(arguments, &rows), table)?;
+    Ok(Outcome::success(text).if_written(all_written))
 }

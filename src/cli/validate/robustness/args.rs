@@ -1,4 +1,4 @@
-//! The options of `robustness`.
+//! The options of the suite of robustness.
 
 use super::sweep::RobustnessSweep;
 use crate::cli::options::catalog::CatalogOptions;
@@ -13,10 +13,11 @@ use starpipe::study::robustness::{Mirrored, Protocol};
 const MAX_BRIGHT_FALSE: i64 = 100_000;
 
 #[derive(Debug, Args)]
+#[command(override_usage = "starpipe validate --suite robustness [OPTIONS]")]
 #[command(after_help = "Examples:\n  \
-    starpipe robustness\n  \
-    starpipe robustness --count 10000 --stars 20 --format csv > robustness.csv\n  \
-    starpipe robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
+    starpipe validate --suite robustness\n  \
+    starpipe validate --suite robustness --count 10000 --stars 20 --format csv > robustness.csv\n  \
+    starpipe validate --suite robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
     Lists of centroids are drawn from the catalogue, at attitudes uniform over all rotations, with errors, missing\n\
     and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
     standard one: five fields of view, then one worse condition at a time in a field of 10 degrees,\n\
