@@ -158,7 +158,7 @@ pub fn median_of<T: Copy + Default + Into<f64>>(values: impl Iterator<Item = T>)
     (!values.is_empty()).then(|| median(&mut values))
 }
 
-/// The value of ascending ones that is nearest to a share of them; `None` if there are none.
+/// The quantile `share` of ascending values: one of them, and `None` if there are none.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     sorted.get((share * last as f64).round() as usize).copied()

@@ -247,7 +247,8 @@ impl BatchFitter {
         model
     }
 
-    /// The normal equations of one star.
+    /// The normal equations of one star, from its lane of sums in single precision: those of
+    /// `base::least_squares` add row after row, and this is done for every star of a frame.
     fn normal_of(
         &self,
         lane: usize,
