@@ -30,6 +30,7 @@ mod plot;
 mod process;
 mod progress;
 mod robustness;
+#[cfg(feature = "shell")]
 mod shell;
 mod short_help;
 mod simulate;
@@ -95,7 +96,9 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::Experiment(arguments) => experiment::experiment(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
+        #[cfg(feature = "shell")]
         Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
+        #[cfg(feature = "shell")]
         Command::Man(arguments) => shell::man(&arguments, Arguments::command()),
     }
 }
