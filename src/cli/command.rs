@@ -12,6 +12,7 @@ use super::identify::IdentifyArgs;
 use super::limit::LimitArgs;
 use super::night::NightArgs;
 use super::process::ProcessArgs;
+#[cfg(feature = "shell")]
 use super::shell::{CompletionsArgs, ManArgs};
 use super::simulate::SimulateArgs;
 use super::track::TrackArgs;
@@ -106,8 +107,10 @@ pub(crate) enum Command {
     Darks(DarksArgs),
     /// Make a master flat from evenly lit frames, and measure gain and response
     Flats(FlatsArgs),
+    #[cfg(feature = "shell")]
     /// Write a script that completes commands and options in a shell
     Completions(CompletionsArgs),
+    #[cfg(feature = "shell")]
     /// Write a manual page
     Man(ManArgs),
 }

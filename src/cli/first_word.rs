@@ -6,7 +6,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 /// First words that mean a command, as other programs or people call it.
-const SYNONYMS: [(&str, &str); 9] = [
+const SYNONYMS: [(&str, &str); 8] = [
     ("analyze", "process"),
     ("detect", "process"),
     ("measure", "process"),
@@ -15,7 +15,6 @@ const SYNONYMS: [(&str, &str); 9] = [
     ("solve", "process"),
     ("solve-field", "process"),
     ("generate", "simulate"),
-    ("completion", "completions"),
 ];
 
 const VALIDATE: &str = "validate";

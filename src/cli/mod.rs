@@ -28,6 +28,7 @@ mod page;
 mod plot;
 mod process;
 mod progress;
+#[cfg(feature = "shell")]
 mod shell;
 mod short_help;
 mod simulate;
@@ -95,7 +96,9 @@ fn run_command(command: Command) -> Result<Outcome, CommandError> {
         Command::ValidateSky(arguments) => validate::sky(&arguments),
         Command::ValidateRobustness(arguments) => validate::robustness(&arguments),
         Command::ValidateClutter(arguments) => validate::clutter(&arguments),
+        #[cfg(feature = "shell")]
         Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
+        #[cfg(feature = "shell")]
         Command::Man(arguments) => shell::man(&arguments, Arguments::command()),
     }
 }

@@ -720,6 +720,7 @@ fn a_table_has_a_line_for_each_frame_and_a_summary() {
     assert_eq!(statuses, ["identified", "identified", "not_identified"]);
 }
 
+#[cfg(feature = "shell")]
 #[test]
 fn shells_and_manuals_know_the_options() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {

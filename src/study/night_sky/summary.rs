@@ -68,7 +68,6 @@ const CELL_GROUPS: [(&str, CellBelongs); 8] = [
 
 /// Errors in a group of cells, measured less true.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CellGroup {
     pub group: &'static str,
     pub cells: usize,
@@ -86,7 +85,6 @@ pub struct CellGroup {
 /// Errors in a group of frames, measured less true; a pull is the root mean square of errors over stated
 /// errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct GroupRow {
     pub group: &'static str,
     pub frames: usize,
@@ -112,7 +110,6 @@ pub struct GroupRow {
 
 /// Cells whose probability of a clear sky is in a tenth of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct ClearTenth {
     pub clear_from: f64,
     pub clear_to: f64,

@@ -27,12 +27,12 @@ mod protocol;
 mod table;
 mod trial;
 
-pub use answers::Answers;
+pub use answers::{Answer, Answers};
 pub use centroids::{SimulatedCentroids, random_rotation};
 pub use interval::Interval;
 pub use protocol::{Mirrored, Protocol};
 pub use table::{Case, CaseResult, VariedParameter, standard_cases};
-pub use trial::{Answer, TrialResult, TrialResults};
+pub use trial::{TrialResult, TrialResults};
 
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::{IndexedCatalog, identify};

@@ -1,56 +1,9 @@
 //! Results of trials, and their rates.
 
-use super::answers::Answers;
+use super::answers::{Answer, Answers};
 use super::centroids::SimulatedCentroids;
-use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation};
 use crate::base::statistics::quantile;
-use crate::camera::CameraModel;
 use crate::identify::{Identification, StarMatch};
-use serde::{Deserialize, Serialize};
-
-/// The answer of an identification, compared with the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Answer {
-    /// Identified correctly.
-    Right,
-    /// Identified as another field.
-    Wrong,
-    /// Not identified.
-    #[default]
-    None,
-}
-
-impl Answer {
-    /// Compares `found` with the true `camera` and attitude.
-    pub fn of(
-        found: &Identification,
-        camera: &CameraModel,
-        icrs_to_camera: &Rotation<Icrs, Camera>,
-    ) -> Self {
-        /// Largest error of a right answer at the centre and the corners, as a share of the frame's
-        /// width. Wrong answers are nearly always off by more than the whole width.
-        const TOLERANCE: f64 = 0.01;
-        let (right, bottom) = (camera.width_px - 1.0, camera.height_px - 1.0);
-        let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
-        let tolerance_rad = TOLERANCE * camera.width_px / camera.focal_length_px();
-        let is_right = |pixel: PixelPoint| {
-            let Some(truth) = camera.direction_of(&pixel) else {
-                return true;
-            };
-            let truth = icrs_to_camera.inverse().apply(&truth);
-            let direction = found.camera.direction_of(&pixel);
-            let direction = direction.map(|d| found.icrs_to_camera.inverse().apply(&d));
-            direction.is_some_and(|d| d.angle_to(&truth) <= tolerance_rad)
-        };
-        let corners = corners.map(|(x, y)| PixelPoint::new(x, y));
-        if is_right(camera.centre()) && corners.into_iter().all(is_right) {
-            Self::Right
-        } else {
-            Self::Wrong
-        }
-    }
-}
 
 /// The result of one trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
