@@ -68,7 +68,6 @@ const CELL_GROUPS: [(&str, CellBelongs); 8] = [
 
 /// Errors in a group of cells, measured less true.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct CellGroup {
     pub group: &'static str,
     pub cells: usize,
