@@ -39,6 +39,8 @@ fn suite() -> Arg {
         .long("suite")
         .value_name("SUITE")
         .help("Run a suite in place of frames of one camera. Each has options of its own: starpipe validate --suite NAME --help")
+        .help_heading(None::<&str>)
+        .display_order(0)
         .value_parser(PossibleValuesParser::new(names))
 }
 
@@ -59,8 +61,6 @@ fn suite() -> Arg {
     These are the options without --suite. starpipe validate --suite NAME --help has those of a suite:\n\
     hard, sky, robustness or clutter.")]
 pub(crate) struct ValidateArgs {
-    #[command(flatten)]
-    pub(super) run: RunOptions,
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
     pub(super) scale_unknown: bool,
@@ -72,6 +72,8 @@ pub(crate) struct ValidateArgs {
         allow_hyphen_values = true
     )]
     pub(super) sweep: Vec<StudySweep>,
+    #[command(flatten)]
+    pub(super) run: RunOptions,
 }
 
 #[derive(Debug, Args)]
@@ -83,11 +85,11 @@ pub(crate) struct ValidateArgs {
     Each case is a run as starpipe validate does it: its results are in DIR/CASE/, and a row for each case is in\n\
     suite.csv, suite.json and suite.txt. A run that was stopped goes on with the same command.")]
 pub(crate) struct HardArgs {
-    #[command(flatten)]
-    pub(super) run: RunOptions,
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
     pub(super) scale_unknown: bool,
+    #[command(flatten)]
+    pub(super) run: RunOptions,
 }
 
 #[derive(Debug, Args)]
