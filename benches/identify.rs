@@ -60,7 +60,11 @@ fn bench_parts(
             for _ in 0..rounds {
                 let pointing = workspace.find_pointing(black_box(field), priors, indexed);
                 let start = Instant::now();
-                black_box(pointing.and_then(identify::Pointing::name_stars).is_ok());
+                black_box(
+                    pointing
+                        .and_then(identify::PointedField::name_stars)
+                        .is_ok(),
+                );
                 taken += start.elapsed();
             }
             taken

@@ -82,7 +82,7 @@ impl Bench<'_> {
         let field = star_field(&self.frame, &self.known, StarPlaces::default());
         let pointing = self.identify.find_pointing(&field, &priors, &self.indexed);
         let start = Instant::now();
-        let found = pointing.and_then(identify::Pointing::name_stars);
+        let found = pointing.and_then(identify::PointedField::name_stars);
         (milliseconds(start), found.ok().cloned())
     }
 

@@ -15,7 +15,7 @@ use starpipe::identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, StarField, Workspace,
 };
 use starpipe::pipeline::star_field;
-use starpipe::study::robustness::{Answer, Protocol, SimulatedCentroids};
+use starpipe::study::robustness::{Answer, SimulatedCentroids, TrialProtocol};
 use std::error::Error;
 use std::f64::consts::SQRT_2;
 use std::time::Instant;
@@ -103,9 +103,9 @@ fn simulated(fields: u64, indexed: &IndexedCatalog) {
     for number in 0..fields {
         let place = (number as f64 + 0.5) / fields as f64;
         let fov_deg = FOV_DEG.0 * (FOV_DEG.1 / FOV_DEG.0).powf(place);
-        let protocol = Protocol {
+        let protocol = TrialProtocol {
             fov_deg,
-            ..Protocol::default()
+            ..TrialProtocol::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let drawn = SimulatedCentroids::draw(&protocol, indexed, &mut random);

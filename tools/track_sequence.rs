@@ -109,7 +109,7 @@ fn turn_between(from: &Attitude, to: &Attitude) -> Vector3<f64> {
 
 /// Counts and sums over the frames.
 #[derive(Default)]
-struct Tally {
+struct TrackTally {
     tracked: u64,
     acquired: u64,
     lost: u64,
@@ -133,7 +133,7 @@ struct Tally {
     times_us: Vec<f64>,
 }
 
-impl Tally {
+impl TrackTally {
     fn add(&mut self, track: &Track, truth: &Attitude, rate: Vector3<f64>, before: Mode) {
         match track.mode {
             Mode::Tracked => self.tracked += 1,
@@ -256,14 +256,14 @@ impl FullSolution {
 }
 
 /// What is to be done.
-struct Plan {
+struct SequencePlan {
     carrier: Carrier,
     frames: u64,
     seed: u64,
     stress: Option<u64>,
 }
 
-impl Plan {
+impl SequencePlan {
     fn of_arguments() -> Result<Self, Box<dyn Error>> {
         let arguments: Vec<String> = std::env::args().skip(1).collect();
         let number = |at: usize| {
@@ -301,7 +301,7 @@ impl Plan {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let plan = Plan::of_arguments()?;
+    let plan = SequencePlan::of_arguments()?;
     let indexed = IndexedCatalog::built_in();
     let mut scenario = Scenario::new(camera());
     scenario.conditions.exposure_s = plan.carrier.exposure_s();
@@ -318,7 +318,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Rotation::looking_at(&UnitVector::from_vector(Vector3::new(x, y, z)), 0.5)
     };
     let mut truth = elsewhere();
-    let (mut tally, mut before) = (Tally::default(), Mode::Acquired);
+    let (mut tally, mut before) = (TrackTally::default(), Mode::Acquired);
     for number in 0..plan.frames {
         let time_s = INTERVAL_S * number as f64;
         if number > 0 {

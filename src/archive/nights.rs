@@ -31,7 +31,7 @@ const COLUMNS: [&str; 12] = [
 
 /// What one camera saw in one night. Values are medians over its frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct NightSummary {
+pub struct CameraNight {
     /// Date of the evening; empty for frames without a date.
     pub night: String,
     /// The stated camera; empty where none is.
@@ -64,7 +64,7 @@ pub struct NightSummary {
 /// One night of one camera: its frames.
 #[derive(Default)]
 struct Night {
-    summary: NightSummary,
+    summary: CameraNight,
     limits: Vec<f64>,
     predicted: Vec<f64>,
     differences: Vec<f64>,
@@ -91,9 +91,9 @@ impl Nights {
     }
 
     /// What each camera saw in each night, by night and camera.
-    pub fn finish(self) -> Vec<NightSummary> {
+    pub fn finish(self) -> Vec<CameraNight> {
         let nights = self.0.into_iter();
-        let finished = nights.map(|([night, camera], frames)| NightSummary {
+        let finished = nights.map(|([night, camera], frames)| CameraNight {
             night,
             camera,
             ..frames.finish()
@@ -106,7 +106,7 @@ impl Nights {
 ///
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`].
-pub fn summary(archive: &Archive) -> Result<Vec<NightSummary>, ArchiveError> {
+pub fn summary(archive: &Archive) -> Result<Vec<CameraNight>, ArchiveError> {
     let mut nights = Nights::default();
     for part in archive.parts_with_frames() {
         let path = archive.frames_of(&part);
@@ -147,13 +147,13 @@ impl Night {
         }
     }
 
-    fn finish(self) -> NightSummary {
+    fn finish(self) -> CameraNight {
         let zero_point_vmag = rounded_median(&self.zero_points);
         let change = |median: f64| {
             let changes = self.zero_points.iter().map(|zero| (zero - median).abs());
             changes.fold(0.0, f64::max)
         };
-        NightSummary {
+        CameraNight {
             limit50_vmag: rounded_median(&self.limits),
             predicted_limit50_vmag: rounded_median(&self.predicted),
             limit_difference_mag: rounded_median(&self.differences),

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// How far an archive is.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Status {
+pub struct ArchiveStatus {
     /// Parts in all.
     pub parts: usize,
     /// Parts that are written and whole.
@@ -40,7 +40,7 @@ pub struct UnreadFrame {
     pub reason: String,
 }
 
-impl Status {
+impl ArchiveStatus {
     /// Whether all parts are written and whole.
     pub fn is_complete(&self) -> bool {
         self.parts_done == self.parts
@@ -51,12 +51,12 @@ impl Status {
 ///
 /// # Errors
 /// [`ArchiveError::File`], [`ArchiveError::Table`] for a part that is not what was written.
-pub fn status(archive: &Archive) -> Result<Status, ArchiveError> {
+pub fn status(archive: &Archive) -> Result<ArchiveStatus, ArchiveError> {
     let plan = archive.plan();
-    let mut status = Status {
+    let mut status = ArchiveStatus {
         parts: plan.parts().len(),
         files: plan.names().len(),
-        ..Status::default()
+        ..ArchiveStatus::default()
     };
     for part in plan.parts() {
         let lost = match archive.state(&part) {

@@ -10,14 +10,14 @@ const MAX_ROUNDS: usize = 20;
 
 /// Mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Moments {
+pub(super) struct RobustMoments {
     /// The mean.
     pub mean: f64,
     /// The standard deviation.
     pub sigma: f64,
 }
 
-impl Moments {
+impl RobustMoments {
     /// Mean and standard deviation of `values` without outliers, by iterative clipping. NaN is
     /// ignored.
     ///
@@ -143,11 +143,11 @@ mod tests {
             .collect();
         values[..500].fill(4000.0);
         values[500] = f32::NAN;
-        let found = Moments::clipped(&values, 0.0).unwrap();
+        let found = RobustMoments::clipped(&values, 0.0).unwrap();
         // Five standard errors: 3/√n and 3/√(2n).
         assert!((found.mean - 100.0).abs() < 5.0 * 0.0095, "{found:?}");
         assert!((found.sigma - 3.0).abs() < 5.0 * 0.0067, "{found:?}");
-        assert_eq!(Moments::clipped(&[f32::NAN; 3], 1.0), None);
+        assert_eq!(RobustMoments::clipped(&[f32::NAN; 3], 1.0), None);
     }
 
     #[test]
@@ -156,7 +156,7 @@ mod tests {
             .iter()
             .map(|v| (0.3 * v).round() as f32)
             .collect();
-        let found = Moments::clipped(&values, 0.5).unwrap();
+        let found = RobustMoments::clipped(&values, 0.5).unwrap();
         let share = values.iter().filter(|v| **v != 0.0).count() as f64 / 1e5;
         assert!(
             (found.sigma - share.sqrt()).abs() < 0.01,

@@ -66,7 +66,7 @@ mod tycho2;
 pub use error::CatalogError;
 pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
-pub use import::{ImportSummary, Reading, SourceFile};
+pub use import::{ImportSummary, LoadedCatalog, SourceFile};
 pub use numbers::StarNumbers;
 pub use read::read_until;
 pub use read::{import, read};

@@ -17,10 +17,10 @@ const HEADER_BYTES: usize = 16;
 const STAR_BYTES: u64 = 13;
 const HR_BYTES: u64 = 6;
 
-static TABLE: OnceLock<Numbers> = OnceLock::new();
+static TABLE: OnceLock<NumberColumns> = OnceLock::new();
 
 /// The columns of the file, which are read where they lie; a number of 0 is none.
-struct Numbers {
+struct NumberColumns {
     /// Ascending.
     skymap: &'static [[u8; 4]],
     hd: &'static [[u8; 3]],
@@ -31,7 +31,7 @@ struct Numbers {
     hr: &'static [[u8; 2]],
 }
 
-impl Numbers {
+impl NumberColumns {
     /// The table in use: the one that was given, else the built-in one.
     fn table() -> Option<&'static Self> {
         #[cfg(any(feature = "built-in-catalog", test))]
@@ -130,14 +130,14 @@ impl StarNumbers {
     /// [`CompactError`] if it is not such a table.
     pub fn give_table(bytes: Vec<u8>) -> Result<(), CompactError> {
         if TABLE.get().is_none() {
-            let _ = TABLE.set(Numbers::open(bytes.leak())?);
+            let _ = TABLE.set(NumberColumns::open(bytes.leak())?);
         }
         Ok(())
     }
 
     /// The numbers of the star with a Skymap or Hipparcos number; none of any other star.
     pub(super) fn of(id: StarId) -> Self {
-        let Some(numbers) = Numbers::table() else {
+        let Some(numbers) = NumberColumns::table() else {
             return Self::default();
         };
         let row = match id {
@@ -196,14 +196,14 @@ mod tests {
         let stars = Catalog::built_in().stars().iter();
         let mut skymap: Vec<u32> = stars.map(|star| star.id.to_raw().1 as u32).collect();
         skymap.sort_unstable();
-        let numbers = Numbers::table().unwrap();
+        let numbers = NumberColumns::table().unwrap();
         let listed: Vec<u32> = numbers.skymap.iter().filter_map(number).collect();
         assert_eq!(skymap, listed);
     }
 
     #[test]
     fn what_is_no_table_is_refused() {
-        let refused = |bytes| Numbers::open(bytes).err().unwrap().to_string();
+        let refused = |bytes| NumberColumns::open(bytes).err().unwrap().to_string();
         assert!(refused(b"no table").contains("the mark"));
         assert!(refused(b"").contains("the mark"));
         assert!(refused(&BUILT_IN[..BUILT_IN.len() - 1]).contains("the end of a file"));

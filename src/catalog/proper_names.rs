@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 const TABLE: &str = include_str!("../../assets/star-names.csv");
 
 /// A row of the table.
-struct Named {
+struct ProperName {
     skymap: u32,
     hipparcos: u32,
     name: &'static str,
@@ -28,7 +28,7 @@ pub(super) fn of(id: StarId) -> Option<&'static str> {
         }
         StarId::Hipparcos(id) => {
             let mut all = names().by_skymap.iter();
-            let is_it = |star: &&Named| HipparcosId::new(star.hipparcos, None) == Some(id);
+            let is_it = |star: &&ProperName| HipparcosId::new(star.hipparcos, None) == Some(id);
             all.find(is_it).map(|star| star.name)
         }
         _ => None,
@@ -36,7 +36,7 @@ pub(super) fn of(id: StarId) -> Option<&'static str> {
 }
 
 struct Names {
-    by_skymap: Vec<Named>,
+    by_skymap: Vec<ProperName>,
 }
 
 fn names() -> &'static Names {
@@ -44,13 +44,13 @@ fn names() -> &'static Names {
     NAMES.get_or_init(|| {
         let rows = TABLE.lines().skip(1).filter_map(|line| {
             let mut cells = line.split(',');
-            Some(Named {
+            Some(ProperName {
                 skymap: cells.next()?.parse().ok()?,
                 hipparcos: cells.next()?.parse().ok()?,
                 name: cells.next()?,
             })
         });
-        let mut by_skymap: Vec<Named> = rows.collect();
+        let mut by_skymap: Vec<ProperName> = rows.collect();
         by_skymap.sort_by_key(|star| star.skymap);
         Names { by_skymap }
     })

@@ -1,11 +1,11 @@
 //! Reads a catalogue, a file or a directory, whose kind is detected from its content.
 
 use super::import::{
-    CatalogPart, Format, ImportRows, ImportSummary, ImportTally, OpenedFile, Reading, SourceFile,
-    combine,
+    CatalogPart, ImportRows, ImportSummary, ImportTally, LoadedCatalog, OpenedFile, RowParser,
+    SourceFile, combine,
 };
 use super::sky2000::FixedWidth;
-use super::table::Table;
+use super::table::CatalogTable;
 use super::tycho2::Tycho2;
 use super::{Catalog, CatalogError, compact};
 use crate::base::interrupt::Interrupt;
@@ -46,7 +46,7 @@ impl Catalog {
 ///
 /// # Errors
 /// As for [`Catalog::read`].
-pub fn read(path: &Path) -> Result<Reading, CatalogError> {
+pub fn read(path: &Path) -> Result<LoadedCatalog, CatalogError> {
     read_until(path, &Interrupt::default())
 }
 
@@ -54,15 +54,15 @@ pub fn read(path: &Path) -> Result<Reading, CatalogError> {
 ///
 /// # Errors
 /// As for [`Catalog::read`]; [`CatalogError::Read`].
-pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<Reading, CatalogError> {
+pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, CatalogError> {
     if path.is_dir() {
         return read_directory(path, interrupt);
     }
     let file = OpenedFile::open(path, interrupt)?;
-    if let Kind::Compact = Kind::of(&file.head) {
+    if let CatalogFileKind::Compact = CatalogFileKind::of(&file.head) {
         let catalog = read_compact(path, file)?;
         let files = Vec::new();
-        return Ok(Reading { catalog, files });
+        return Ok(LoadedCatalog { catalog, files });
     }
     let part = read_part(path, file)?;
     combine(path, title(path, &*part.format), vec![part])
@@ -73,7 +73,7 @@ pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<Reading, Catalog
 /// # Errors
 /// As for [`Catalog::read`]; [`CatalogError::UnknownKind`] also for a compact catalogue, which has
 /// no records.
-pub fn import(path: &Path) -> Result<Reading, CatalogError> {
+pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
     let reading = read(path)?;
     if reading.files.is_empty() {
         return Err(CatalogError::already_compact(path));
@@ -82,7 +82,7 @@ pub fn import(path: &Path) -> Result<Reading, CatalogError> {
 }
 
 /// The kind of a file, as far as its first bytes tell.
-enum Kind {
+enum CatalogFileKind {
     Compact,
     Sky2000,
     Tycho2(Tycho2),
@@ -90,7 +90,7 @@ enum Kind {
     Table,
 }
 
-impl Kind {
+impl CatalogFileKind {
     fn of(head: &[u8]) -> Self {
         if head.starts_with(&compact::MAGIC) {
             Self::Compact
@@ -117,12 +117,14 @@ fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> 
 
 /// Reads the records of a file that is not compact.
 fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError> {
-    let kind = Kind::of(&file.head);
+    let kind = CatalogFileKind::of(&file.head);
     let mut rows = ImportRows::new(file.reader);
-    let format: Box<dyn Format + Send> = match kind {
-        Kind::Sky2000 => Box::new(FixedWidth),
-        Kind::Tycho2(file) => Box::new(file),
-        Kind::Compact | Kind::Table => Box::new(Table::open(&mut rows, path)?),
+    let format: Box<dyn RowParser + Send> = match kind {
+        CatalogFileKind::Sky2000 => Box::new(FixedWidth),
+        CatalogFileKind::Tycho2(file) => Box::new(file),
+        CatalogFileKind::Compact | CatalogFileKind::Table => {
+            Box::new(CatalogTable::open(&mut rows, path)?)
+        }
     };
     let tally = ImportTally::read(&mut rows, &*format, path)?;
     Ok(CatalogPart {
@@ -134,7 +136,7 @@ fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError>
 
 /// The files of a directory by kind.
 #[derive(Default)]
-struct Directory {
+struct CatalogDirectory {
     tycho2: Vec<PathBuf>,
     /// Files of Tycho-2 whose entries are probably not stars.
     left_out: Vec<PathBuf>,
@@ -142,24 +144,26 @@ struct Directory {
     others: Vec<PathBuf>,
 }
 
-impl Directory {
+impl CatalogDirectory {
     fn list(path: &Path, interrupt: &Interrupt) -> Result<Self, CatalogError> {
         let mut found = Self::default();
         let mut has_supplement_1 = false;
         for path in files_in(path)? {
             let file = OpenedFile::open(&path, interrupt)?;
-            match Kind::of(&file.head) {
-                Kind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
-                Kind::Tycho2(part) => {
+            match CatalogFileKind::of(&file.head) {
+                CatalogFileKind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
+                CatalogFileKind::Tycho2(part) => {
                     has_supplement_1 |= part == Tycho2::Supplement1;
                     found.tycho2.push(path);
                 }
-                Kind::Compact | Kind::Sky2000 => found.others.push(path),
-                Kind::Table => match Table::open(&mut ImportRows::new(file.reader), &path) {
-                    Ok(_) => found.others.push(path),
-                    Err(error) if error.is_of_system() => return Err(error),
-                    Err(_) => {}
-                },
+                CatalogFileKind::Compact | CatalogFileKind::Sky2000 => found.others.push(path),
+                CatalogFileKind::Table => {
+                    match CatalogTable::open(&mut ImportRows::new(file.reader), &path) {
+                        Ok(_) => found.others.push(path),
+                        Err(error) if error.is_of_system() => return Err(error),
+                        Err(_) => {}
+                    }
+                }
             }
         }
         if !has_supplement_1 {
@@ -171,8 +175,8 @@ impl Directory {
 }
 
 /// Reads the catalogue in a directory: all files of Tycho-2, or the one file of another kind.
-fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<Reading, CatalogError> {
-    let found = Directory::list(path, interrupt)?;
+fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, CatalogError> {
+    let found = CatalogDirectory::list(path, interrupt)?;
     if let ([], [only]) = (&*found.tycho2, &*found.others) {
         return read_until(only, interrupt);
     }
@@ -233,7 +237,7 @@ fn contents_of(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
 }
 
 /// The title of a catalogue, with the file name, which alone tells the version.
-fn title(path: &Path, format: &dyn Format) -> String {
+fn title(path: &Path, format: &dyn RowParser) -> String {
     // `.` has no name of its own.
     let full = path.canonicalize().unwrap_or_default();
     let name = path.file_name().or(full.file_name()).unwrap_or_default();

@@ -81,7 +81,7 @@ pub(super) struct CentroidColumn {
 }
 
 /// The columns that are used.
-pub(super) struct Columns {
+pub(super) struct CentroidColumns {
     x: CentroidColumn,
     y: CentroidColumn,
     /// Position of the centre of the first pixel on both axes.
@@ -101,7 +101,7 @@ struct MeasuredColumns {
     flags: CentroidColumn,
 }
 
-impl Columns {
+impl CentroidColumns {
     /// The columns with these headings. Of several brightnesses the first is used of which `rows`
     /// have any.
     pub fn find<R: Iterator<Item = StringRecord>>(

@@ -54,7 +54,7 @@ impl ListFrame {
             if !self.is_guessed[along] {
                 return Beyond::default();
             }
-            let reach = Reach {
+            let reach = CentroidExtent {
                 gap_px: list.reach_px(along)[0].max(0.0),
                 side_px: self.size.sides()[along] as f64,
                 stars: list.centroids.len(),
@@ -77,7 +77,7 @@ struct Measure {
 }
 
 /// How far the centroids of a list reach along one axis.
-struct Reach {
+struct CentroidExtent {
     /// What they leave free before the first.
     gap_px: f64,
     /// As far as they reach.
@@ -92,7 +92,7 @@ struct Beyond {
     square_px2: f64,
 }
 
-impl Reach {
+impl CentroidExtent {
     /// `axis` is where the stars see the axis of the lens, from the centre of the guessed frame.
     fn centre_beyond(&self, axis: Option<Measure>) -> Beyond {
         /// Steps of the probability of a frame that is whole, and of one that is not.
@@ -174,7 +174,7 @@ fn lens_axis(list: &CentroidList, found: &Identification) -> Option<[Measure; 2]
 mod tests {
     use super::*;
 
-    const REACH: Reach = Reach {
+    const REACH: CentroidExtent = CentroidExtent {
         gap_px: 5.0,
         side_px: 1000.0,
         stars: 100,

@@ -1,6 +1,6 @@
 //! Lists of centroids as tables.
 
-use super::columns::{Brightness, Columns};
+use super::columns::{Brightness, CentroidColumns};
 use super::list::CentroidList;
 use super::text::ListText;
 use crate::base::coords::PixelPoint;
@@ -103,7 +103,7 @@ impl CentroidList {
         let headings = reader.headers().map_err(not_a_table)?;
         let rows = || self::reader(&text, separator).into_records().flatten();
         let columns =
-            Columns::find(headings, separator, rows).map_err(CentroidListError::of_list)?;
+            CentroidColumns::find(headings, separator, rows).map_err(CentroidListError::of_list)?;
         let size = [options.width, options.height].map(|side| side.map(|side| side as usize));
         let mut centroids = Vec::new();
         // The problem of the first row that is not usable, with its line.

@@ -1,6 +1,6 @@
 //! `camera new` and `camera list`: descriptions of cameras.
 
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use super::options::scenario::preset;
 use super::output::files::write_whole;
 use clap::{Args, Subcommand};
@@ -42,17 +42,17 @@ struct NewArgs {
 }
 
 /// `starpipe camera`
-pub(crate) fn camera(arguments: &CameraArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn camera(arguments: &CameraArgs) -> Result<CommandOutput, CommandError> {
     match &arguments.command {
         CameraCommand::New(arguments) => new(arguments),
-        CameraCommand::List => Ok(Outcome::success(list())),
+        CameraCommand::List => Ok(CommandOutput::success(list())),
     }
 }
 
-fn new(arguments: &NewArgs) -> Result<Outcome, CommandError> {
+fn new(arguments: &NewArgs) -> Result<CommandOutput, CommandError> {
     let text = template(arguments.preset);
     let Some(path) = &arguments.output else {
-        return Ok(Outcome::success(text));
+        return Ok(CommandOutput::success(text));
     };
     // A link counts as existing even if its target does not exist.
     if !arguments.force && path.symlink_metadata().is_ok() {
@@ -62,7 +62,7 @@ fn new(arguments: &NewArgs) -> Result<Outcome, CommandError> {
         )));
     }
     write_whole(path, text.as_bytes())?;
-    Ok(Outcome::success(String::new()))
+    Ok(CommandOutput::success(String::new()))
 }
 
 fn list() -> String {

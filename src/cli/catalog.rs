@@ -1,6 +1,6 @@
 //! `catalog import`: converts star catalogues.
 
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use super::options::values;
 use super::output::overwrite::is_same_file;
 use anyhow::anyhow;
@@ -45,13 +45,13 @@ struct ImportArgs {
 }
 
 /// `starpipe catalog`
-pub(crate) fn catalog(arguments: CatalogArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn catalog(arguments: CatalogArgs) -> Result<CommandOutput, CommandError> {
     match arguments.command {
         CatalogCommand::Import(arguments) => import(&arguments),
     }
 }
 
-fn import(arguments: &ImportArgs) -> Result<Outcome, CommandError> {
+fn import(arguments: &ImportArgs) -> Result<CommandOutput, CommandError> {
     let reading = catalog::import(&arguments.file)?;
     check_output(&arguments.output, &reading.files)?;
     let mut catalog = reading.catalog;
@@ -75,7 +75,7 @@ fn import(arguments: &ImportArgs) -> Result<Outcome, CommandError> {
         counted(catalog.stars().len(), "star"),
         catalog.title(),
     );
-    Ok(Outcome::success(text))
+    Ok(CommandOutput::success(text))
 }
 
 /// Refuses to overwrite a file that is read.

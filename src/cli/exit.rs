@@ -4,12 +4,12 @@ use std::fmt::Display;
 use std::process::ExitCode;
 
 /// Result of a command: what is still to be printed on standard output, and the exit status.
-pub(crate) struct Outcome {
+pub(crate) struct CommandOutput {
     pub(crate) text: String,
     pub(crate) exit: Exit,
 }
 
-impl Outcome {
+impl CommandOutput {
     /// The same, but [`Exit::Failure`] unless everything that was asked for besides is written.
     pub(crate) fn if_written(self, all: bool) -> Self {
         let exit = if all { self.exit } else { Exit::Failure };
@@ -25,7 +25,7 @@ impl Outcome {
     }
 }
 
-impl From<Exit> for Outcome {
+impl From<Exit> for CommandOutput {
     /// Nothing is left to print.
     fn from(exit: Exit) -> Self {
         Self {
@@ -57,14 +57,14 @@ impl Exit {
 
 /// How the frames of a run ended.
 #[derive(Debug, Default)]
-pub(crate) struct Tally {
+pub(crate) struct OutcomeTally {
     pub(crate) identified: usize,
     pub(crate) not_identified: usize,
     /// What could not be read or written.
     pub(crate) failed: usize,
 }
 
-impl Tally {
+impl OutcomeTally {
     /// Counts a frame that could be read.
     pub(crate) fn count(&mut self, is_identified: bool) {
         let count = if is_identified {

@@ -1,6 +1,6 @@
 //! `experiment`: repeats the experiments of the sensitivity paper.
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::output::files::{NewFile, make_directory, write_each};
@@ -11,7 +11,7 @@ use super::progress::frames_bar;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
-use starpipe::study::experiment::{Published, Run, Trials, run};
+use starpipe::study::experiment::{ExperimentRun, Published, TrialSettings, run};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -44,7 +44,7 @@ pub(crate) struct ExperimentArgs {
 }
 
 /// `starpipe experiment`
-pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<CommandOutput, CommandError> {
     let published = Published::experiment(arguments.number)
         .ok_or_else(|| CommandError::usage("the paper has experiments 1 and 2"))?;
     let name = PathBuf::from(format!("experiment-{}", published.number));
@@ -52,7 +52,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
         overwrite::check(std::slice::from_ref(&name), directory, &["png"])?;
         make_directory(directory)?;
     }
-    let trials = Trials {
+    let trials = TrialSettings {
         count: arguments.count,
         seed: arguments.seed,
     };
@@ -67,7 +67,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
         Ok((done.report, write_each(picture)))
     })?;
     let json = || json_line(&report);
-    let outcome = Outcome {
+    let outcome = CommandOutput {
         text: arguments.format.of(|| report.to_text(), json)?,
         exit: if report.is_identified() {
             Exit::Success
@@ -80,7 +80,7 @@ pub(crate) fn experiment(arguments: &ExperimentArgs) -> Result<Outcome, CommandE
 
 /// The picture of the first frame, if there is one.
 fn first_picture(
-    done: &Run,
+    done: &ExperimentRun,
     indexed: &IndexedCatalog,
     directory: &Path,
     name: &Path,

@@ -1,8 +1,8 @@
 //! `flats`: makes a master flat of evenly lit frames, and measures gain and response.
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::frames::{FrameList, for_each_frame, read_master};
-use super::options::format::Format;
+use super::options::format::OutputFormat;
 use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::output::files::write_into;
@@ -40,8 +40,8 @@ pub(crate) struct FlatsArgs {
     #[arg(long, value_name = "FILE.toml")]
     camera: Option<PathBuf>,
     /// What to print: csv has a row for each frame
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    format: OutputFormat,
     /// Also write master-flat.fits into this directory
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -50,7 +50,7 @@ pub(crate) struct FlatsArgs {
 }
 
 /// `starpipe flats`
-pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn flats(arguments: FlatsArgs) -> Result<CommandOutput, CommandError> {
     let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
     if let Some(directory) = &arguments.out {
         let inputs: Vec<_> = frames.iter().chain(&arguments.dark).cloned().collect();
@@ -72,11 +72,11 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<Outcome, CommandError> {
             [master.map(|master| (MASTER.to_owned(), master))],
         )
     });
-    let outcome = Outcome {
+    let outcome = CommandOutput {
         text: match arguments.format {
-            Format::Text => flats.report().to_text(),
-            Format::Json => json_line(&flats.report())?,
-            Format::Csv => csv_table(flats.frame_rows())?,
+            OutputFormat::Text => flats.report().to_text(),
+            OutputFormat::Json => json_line(&flats.report())?,
+            OutputFormat::Csv => csv_table(flats.frame_rows())?,
         },
         exit: Exit::of(failed || unread > 0),
     };

@@ -1,10 +1,10 @@
 //! `identify`: identifies the stars in lists of centroids.
 
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use super::input::stdin;
 use super::options::values::MAX_SIDE_PX;
 use super::solving::options::SolvingOptions;
-use super::solving::{Inputs, Plan, report_all};
+use super::solving::{Inputs, SolvingPlan, report_all};
 use clap::Args;
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::centroids::CentroidListOptions;
@@ -36,7 +36,7 @@ pub(crate) struct IdentifyArgs {
 }
 
 /// `starpipe identify`
-pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn identify(arguments: IdentifyArgs) -> Result<CommandOutput, CommandError> {
     let IdentifyArgs {
         lists,
         width,
@@ -49,10 +49,10 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<Outcome, CommandError>
     let mut options = CentroidListOptions::default();
     [options.width, options.height] = frame_size([width, height], camera.as_ref())?;
     options.frame = frame;
-    let plan = Plan {
+    let plan = SolvingPlan {
         options: solving.options()?,
         camera,
-        ..Plan::default()
+        ..SolvingPlan::default()
     };
     Ok(report_all(&Inputs::Lists(options), &lists, solving, &plan)?.into())
 }

@@ -39,7 +39,7 @@ mod validate;
 use clap::error::ErrorKind;
 use clap::{ArgMatches, CommandFactory, FromArgMatches};
 use command::{Arguments, Command};
-use exit::{CommandError, Exit, Outcome};
+use exit::{CommandError, CommandOutput, Exit};
 use output::messages::{line, report_error};
 use output::stdout::print;
 use starpipe::base::panics::{caught, silence};
@@ -71,7 +71,7 @@ pub(crate) fn run() -> ExitCode {
     }
 }
 
-fn run_command(command: Command) -> Result<Outcome, CommandError> {
+fn run_command(command: Command) -> Result<CommandOutput, CommandError> {
     match command {
         Command::Process(arguments) => process::process(*arguments),
         Command::Sky(mut arguments) => {

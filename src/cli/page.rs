@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::Args;
 use starpipe::catalog::Catalog;
 use starpipe::frame::{self, Buffers};
-use starpipe::report::page::{Fact, Page, PageFigure, PageTable, Thumbnail};
+use starpipe::report::page::{Fact, PageContent, PageFigure, PageTable, Thumbnail};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ impl HtmlOption {
 }
 
 /// The file of a page.
-pub(crate) fn file(path: &Path, page: &Page) -> anyhow::Result<NewFile> {
+pub(crate) fn file(path: &Path, page: &PageContent) -> anyhow::Result<NewFile> {
     let html = page.to_html().context("writing the page")?;
     Ok((path.to_owned(), html.into_bytes()))
 }

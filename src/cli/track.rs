@@ -1,6 +1,6 @@
 //! `track`: follows the attitude of a camera from frame to frame.
 
-use super::exit::{CommandError, Outcome, Tally};
+use super::exit::{CommandError, CommandOutput, OutcomeTally};
 use super::input::frames::{FrameList, read_frame};
 use super::input::stdin::is_stdin;
 use super::options::calibration::CalibrationOptions;
@@ -63,7 +63,7 @@ pub(crate) struct TrackArgs {
 }
 
 /// `starpipe track`
-pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn track(arguments: &TrackArgs) -> Result<CommandOutput, CommandError> {
     let names = arguments.frames.iter().filter(|name| is_stdin(name));
     if names.count() > 1 {
         return Err(CommandError::usage(
@@ -76,12 +76,12 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
     options.exposure_s = arguments.exposure;
     arguments.catalog.with_index(|_, indexed| {
         let context = Context::new(indexed).with_options(&options, camera.clone());
-        let mut run = Run {
+        let mut run = TrackRun {
             tracker: Tracker::new(context).with_stars(arguments.max_stars as usize),
             calibration: calibration.as_ref(),
             clock: FrameClock::new(arguments.interval),
             format: arguments.format,
-            tally: Tally::default(),
+            tally: OutcomeTally::default(),
         };
         run.all(&arguments.frames)?;
         Ok(run.tally.exit().into())
@@ -89,15 +89,15 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<Outcome, CommandError> {
 }
 
 /// State of the frames so far.
-struct Run<'a> {
+struct TrackRun<'a> {
     tracker: Tracker<'a>,
     calibration: Option<&'a Calibration>,
     clock: FrameClock,
     format: PageFormat,
-    tally: Tally,
+    tally: OutcomeTally,
 }
 
-impl Run<'_> {
+impl TrackRun<'_> {
     /// Tracks all frames, those of a list as its lines come.
     fn all(&mut self, inputs: &[PathBuf]) -> Result<(), CommandError> {
         for input in inputs {

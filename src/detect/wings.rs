@@ -67,7 +67,7 @@ pub(super) fn measure_wings(
     sources: &[Detection],
     spot_width_px: f64,
 ) -> FluxScale {
-    let field = Field {
+    let field = WingFrame {
         view,
         background,
         sources,
@@ -176,7 +176,7 @@ fn is_clean(source: &Detection) -> bool {
 }
 
 /// A frame with its sources.
-struct Field<'a> {
+struct WingFrame<'a> {
     view: &'a View<'a>,
     background: &'a Mesh,
     sources: &'a [Detection],
@@ -185,7 +185,7 @@ struct Field<'a> {
     margin_px: f64,
 }
 
-impl Field<'_> {
+impl WingFrame<'_> {
     /// Light in the core and in the rings around a star, over that of its fit; `None` at the frame's border and
     /// where others are near.
     fn light_around(&self, star: &Detection) -> Option<[Estimate; PARTS]> {
@@ -199,7 +199,7 @@ impl Field<'_> {
             others.try_push(other).ok()?;
         }
         let (level, noise) = self.background.at(at.x as f32, at.y as f32);
-        let mut sums = [Sum::default(); PARTS];
+        let mut sums = [RingSum::default(); PARTS];
         for y in rows {
             for x in columns.clone() {
                 let pixel = PixelPoint::new(x as f64, y as f64);
@@ -239,13 +239,13 @@ fn is_nearer(a: &PixelPoint, b: &PixelPoint, distance_px: f64) -> bool {
 
 /// Pixels of a ring.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sum {
+struct RingSum {
     pixels: u32,
     seen: u32,
     light: f64,
 }
 
-impl Sum {
+impl RingSum {
     fn add(&mut self, above: f64, is_seen: bool) {
         self.pixels += 1;
         if is_seen {

@@ -16,7 +16,7 @@ pub(super) const FLOATS_BYTES_PER_PIXEL: usize = 2 * size_of::<f32>();
 /// The account of one frame. Readers and decoders book on it what they hold before they allocate it,
 /// and ask it whether to go on.
 #[derive(Debug, Default)]
-pub(super) struct Account {
+pub(super) struct ReadBudget {
     limit: MemoryLimit,
     held_bytes: Cell<u64>,
     interrupt: Interrupt,
@@ -24,7 +24,7 @@ pub(super) struct Account {
     has_colors: Cell<bool>,
 }
 
-impl Account {
+impl ReadBudget {
     /// An account on which nothing is booked.
     pub fn new(limit: MemoryLimit, interrupt: Interrupt) -> Self {
         Self {
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn what_is_held_counts() {
-        let account = Account::new(MemoryLimit::of_bytes(1000), Interrupt::default());
+        let account = ReadBudget::new(MemoryLimit::of_bytes(1000), Interrupt::default());
         account.hold(600).unwrap();
         assert!(account.check_image(Size::new(10, 10), 4).is_ok());
         assert!(account.check_image(Size::new(10, 10), 5).is_err());
@@ -250,7 +250,7 @@ mod tests {
             let is_due = Arc::clone(&is_due);
             move || is_due.load(Ordering::Relaxed)
         });
-        let account = Account::new(MemoryLimit::DEFAULT, interrupt);
+        let account = ReadBudget::new(MemoryLimit::DEFAULT, interrupt);
         let content = vec![7; 1 << 20];
         let mut reader = account.timed(Cursor::new(&content));
         let mut found = vec![0; 1 << 19];

@@ -1,6 +1,6 @@
 //! The colors of a picture, to draw it as it is: measurements use luminance alone.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
@@ -59,7 +59,7 @@ impl Colors {
 /// The colors in the rows of a file.
 type Decoded = Option<(Size, Vec<[u16; 3]>)>;
 
-fn decode(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
+fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
     Ok(match FrameFormat::of(bytes) {
         Some(FrameFormat::Png | FrameFormat::Jpeg | FrameFormat::Bmp | FrameFormat::Pnm) => {
             of_picture(bytes, account)?
@@ -70,12 +70,12 @@ fn decode(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
 }
 
 /// Refuses a picture that cannot be held twice, as it is decoded and as it is kept.
-fn check(size: Size, account: &Account) -> Result<(), FrameError> {
+fn check(size: Size, account: &ReadBudget) -> Result<(), FrameError> {
     check_size(size.width, size.height)?;
     account.check_image(size, 2 * size_of::<[u16; 3]>())
 }
 
-fn of_picture(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
+fn of_picture(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
     let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let Some((width, height)) = reader().ok().and_then(|r| r.into_dimensions().ok()) else {
         return Ok(None);
@@ -95,7 +95,7 @@ fn of_picture(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
     Ok(Some((size, pixels)))
 }
 
-fn of_tiff(bytes: &[u8], account: &Account) -> Result<Decoded, FrameError> {
+fn of_tiff(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
     let Ok(mut decoder) = Decoder::new(Cursor::new(bytes)) else {
         return Ok(None);
     };

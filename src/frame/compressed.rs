@@ -1,6 +1,6 @@
 //! Files compressed with gzip or bzip2.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::limits::MAX_FILE_BYTES;
@@ -17,7 +17,7 @@ use std::io::{self, ErrorKind, Read};
 pub(super) fn unpack(
     bytes: &[u8],
     format: FrameFormat,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Vec<u8>, FrameError> {
     let (known, inside) = format_inside(bytes, format);
     if known.is_none() && !inside.is_empty() {

@@ -102,7 +102,7 @@ impl Folder {
         for path in files {
             match other_kind(&path).or_else(|| calibration(&path)) {
                 Some(kind) => passed_over.push(PassedOver { path, kind }),
-                None => pictures.push(Picture::of(path)),
+                None => pictures.push(FolderImage::of(path)),
             }
         }
         let rules = Rules::of(&pictures, cameras);
@@ -164,14 +164,14 @@ fn calibration(path: &Path) -> Option<OtherFile> {
 }
 
 /// What is known of an image before it is read.
-struct Picture {
+struct FolderImage {
     path: PathBuf,
     /// Width and height, where the header tells them.
     size: Option<[u32; 2]>,
     by_name: Option<OtherFile>,
 }
 
-impl Picture {
+impl FolderImage {
     fn of(path: PathBuf) -> Self {
         Self {
             size: size_of(&path),
@@ -261,7 +261,7 @@ struct Rules {
 }
 
 impl Rules {
-    fn of(pictures: &[Picture], cameras: Cameras) -> Self {
+    fn of(pictures: &[FolderImage], cameras: Cameras) -> Self {
         let plain = || pictures.iter().filter(|picture| picture.by_name.is_none());
         let mut counts: BTreeMap<[u32; 2], usize> = BTreeMap::new();
         let sizes = plain().filter_map(|picture| picture.size);
@@ -282,7 +282,7 @@ impl Rules {
             cameras,
             main,
             has_plain: plain().count() >= MIN_FRAMES,
-            moments: of_main.map(Picture::moment).collect(),
+            moments: of_main.map(FolderImage::moment).collect(),
             copies: match cameras {
                 Cameras::OneNight => copies(pictures),
                 Cameras::One | Cameras::Any => HashSet::new(),
@@ -290,7 +290,7 @@ impl Rules {
         }
     }
 
-    fn kind(&self, picture: &Picture) -> Option<OtherFile> {
+    fn kind(&self, picture: &FolderImage) -> Option<OtherFile> {
         /// Ratios of width to height that are of one shape differ by this factor at most,
         const SAME_SHAPE: f64 = 1.05;
         /// and by this one at least if the shapes differ.
@@ -323,7 +323,7 @@ fn aspect([width, height]: [u32; 2]) -> f64 {
 
 /// The pictures with the same bytes as another one. Of these, the one with a date in its name is the frame, or
 /// else the first by name. Damaged files that are alike are not: reading each tells why.
-fn copies(pictures: &[Picture]) -> HashSet<PathBuf> {
+fn copies(pictures: &[FolderImage]) -> HashSet<PathBuf> {
     let mut by_length: HashMap<u64, Vec<&Path>> = HashMap::new();
     for picture in pictures.iter().filter(|picture| picture.is_whole()) {
         let length = fs::metadata(&picture.path).map_or(0, |found| found.len());

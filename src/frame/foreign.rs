@@ -12,22 +12,22 @@ use super::tiff::{TiffFile, has_picture_in_sub_directories};
 
 /// A format that is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Foreign {
+pub(super) struct UnsupportedFormat {
     /// What it is, with an article.
     pub name: &'static str,
     /// What to do.
     pub advice: &'static str,
 }
 
-impl Foreign {
+impl UnsupportedFormat {
     /// Whether it has many pictures, one after the other in time.
     pub(super) fn is_video(&self) -> bool {
         self.name.ends_with("video")
     }
 }
 
-impl From<Foreign> for FrameError {
-    fn from(known: Foreign) -> Self {
+impl From<UnsupportedFormat> for FrameError {
+    fn from(known: UnsupportedFormat) -> Self {
         Self::ForeignFormat {
             found: known.name,
             advice: known.advice,
@@ -43,44 +43,44 @@ const VIDEO: &str = "save its frames as FITS or 16-bit TIFF first, for example w
 const PICTURE: &str =
     "convert it to PNG or 16-bit TIFF first, for example with magick FILE FILE.png";
 
-const HEIC: Foreign = Foreign {
+const HEIC: UnsupportedFormat = UnsupportedFormat {
     name: "a HEIC photograph (HEIF)",
     advice: PHOTOGRAPH,
 };
-const AVIF: Foreign = Foreign {
+const AVIF: UnsupportedFormat = UnsupportedFormat {
     name: "an AVIF photograph",
     advice: "convert it to PNG first, for example with avifdec FILE.avif FILE.png",
 };
-const MP4: Foreign = Foreign {
+const MP4: UnsupportedFormat = UnsupportedFormat {
     name: "an MP4 or QuickTime video",
     advice: "save its frames as PNG first, for example with ffmpeg -i FILE frame-%04d.png",
 };
-const MATROSKA: Foreign = Foreign {
+const MATROSKA: UnsupportedFormat = UnsupportedFormat {
     name: "a Matroska or WebM video",
     advice: MP4.advice,
 };
-const AVI: Foreign = Foreign {
+const AVI: UnsupportedFormat = UnsupportedFormat {
     name: "an AVI video",
     advice: VIDEO,
 };
-const WEBP: Foreign = Foreign {
+const WEBP: UnsupportedFormat = UnsupportedFormat {
     name: "a WebP picture",
     advice: "convert it to PNG first, for example with dwebp FILE.webp -o FILE.png",
 };
 
-const fn raw(name: &'static str) -> Foreign {
-    Foreign { name, advice: RAW }
+const fn raw(name: &'static str) -> UnsupportedFormat {
+    UnsupportedFormat { name, advice: RAW }
 }
 
-const fn picture(name: &'static str) -> Foreign {
-    Foreign {
+const fn picture(name: &'static str) -> UnsupportedFormat {
+    UnsupportedFormat {
         name,
         advice: PICTURE,
     }
 }
 
 /// Formats with a signature at the beginning.
-const SIGNATURES: [(&[u8], Foreign); 21] = [
+const SIGNATURES: [(&[u8], UnsupportedFormat); 21] = [
     (b"\x1a\x45\xdf\xa3", MATROSKA),
     (
         b"FUJIFILMCCD-RAW",
@@ -98,14 +98,14 @@ const SIGNATURES: [(&[u8], Foreign); 21] = [
     ),
     (
         b"XISF0100",
-        Foreign {
+        UnsupportedFormat {
             name: "an XISF image",
             advice: "save it as FITS first, with PixInsight or Siril",
         },
     ),
     (
         b"LUCAM-RECORDER",
-        Foreign {
+        UnsupportedFormat {
             name: "a SER video",
             advice: VIDEO,
         },
@@ -123,7 +123,7 @@ const SIGNATURES: [(&[u8], Foreign); 21] = [
 ];
 
 /// The format of `bytes`, if it is one that is known but not read.
-pub(super) fn of(bytes: &[u8]) -> Option<Foreign> {
+pub(super) fn of(bytes: &[u8]) -> Option<UnsupportedFormat> {
     let by_signature = SIGNATURES
         .iter()
         .find(|(start, _)| bytes.starts_with(start));
@@ -134,7 +134,7 @@ pub(super) fn of(bytes: &[u8]) -> Option<Foreign> {
 }
 
 /// Files of the ISO base media format: by the main brand, else by the compatible ones.
-fn of_boxes(bytes: &[u8]) -> Option<Foreign> {
+fn of_boxes(bytes: &[u8]) -> Option<UnsupportedFormat> {
     let length = u32::from_be_bytes(*bytes.first_chunk()?) as usize;
     let (kind, brands) = bytes.get(4..bytes.len().min(length))?.split_at_checked(4)?;
     if kind != b"ftyp" {
@@ -157,7 +157,7 @@ fn of_boxes(bytes: &[u8]) -> Option<Foreign> {
         .or(Some(MP4))
 }
 
-fn of_riff(bytes: &[u8]) -> Option<Foreign> {
+fn of_riff(bytes: &[u8]) -> Option<UnsupportedFormat> {
     match (bytes.get(..4)?, bytes.get(8..12)?) {
         (b"RIFF", b"WEBP") => Some(WEBP),
         (b"RIFF", b"AVI ") => Some(AVI),
@@ -166,7 +166,7 @@ fn of_riff(bytes: &[u8]) -> Option<Foreign> {
 }
 
 /// The kind of raw file that this TIFF file is, if it is one.
-pub(super) fn raw_tiff(bytes: &[u8]) -> Option<Foreign> {
+pub(super) fn raw_tiff(bytes: &[u8]) -> Option<UnsupportedFormat> {
     const CFA: u64 = 32803;
     const REDUCED_IMAGE: u64 = 1;
     let first = TiffFile::of(bytes).ok()?.directories().next()?.ok()?;

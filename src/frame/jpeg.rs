@@ -1,6 +1,6 @@
 //! JPEG, decoded by `zune-jpeg`, which reads as it decodes and can be ended in between.
 
-use super::account::{Account, FLOATS_BYTES_PER_PIXEL};
+use super::account::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
@@ -24,7 +24,7 @@ const BLOCK_PX: usize = 32;
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     let jpeg = Jpeg::open(bytes, account)?;
     // The decoder fills missing data and reports no error.
     if !has_end(bytes) {
@@ -69,7 +69,7 @@ pub(super) struct Jpeg<'a> {
 
 impl<'a> Jpeg<'a> {
     /// Reads the header of the file `bytes`.
-    pub fn open(bytes: &'a [u8], account: &Account) -> Result<Self, FrameError> {
+    pub fn open(bytes: &'a [u8], account: &ReadBudget) -> Result<Self, FrameError> {
         let source = account.timed(ZCursor::new(bytes));
         let mut decoder = JpegDecoder::new_with_options(source, options());
         let opened = decoder.decode_headers();
@@ -100,7 +100,7 @@ impl<'a> Jpeg<'a> {
     }
 
     /// The samples, interleaved. Every row of them is in the file.
-    pub fn samples(&self, account: &Account) -> Result<Vec<u8>, FrameError> {
+    pub fn samples(&self, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
         self.scans.check(Size::new(self.width, self.height))?;
         check_rows(self.bytes, account)?;
         let color = match self.channels {

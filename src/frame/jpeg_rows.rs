@@ -7,7 +7,7 @@
 //! # Reference
 //! ITU-T T.81 (1992), annexes B, C, F and G.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
 
@@ -23,7 +23,7 @@ const MAX_CODE_BITS: u32 = 16;
 /// Refuses an image whose data end, or cannot be decoded any further, before its last row.
 /// # Errors
 /// [`FrameError::Truncated`], [`FrameError::Interrupted`].
-pub(super) fn check_rows(bytes: &[u8], account: &Account) -> Result<(), FrameError> {
+pub(super) fn check_rows(bytes: &[u8], account: &ReadBudget) -> Result<(), FrameError> {
     let walk = Walk {
         account: Some(account),
         ..Walk::default()
@@ -43,7 +43,7 @@ pub(super) fn check_rows(bytes: &[u8], account: &Account) -> Result<(), FrameErr
 
 /// Where the data end.
 #[derive(Debug, PartialEq, Eq)]
-struct Missing {
+struct MissingRows {
     row: usize,
     height: usize,
 }
@@ -51,7 +51,7 @@ struct Missing {
 /// What the segments before a scan say.
 #[derive(Default)]
 struct Walk<'a> {
-    account: Option<&'a Account>,
+    account: Option<&'a ReadBudget>,
     is_progressive: bool,
     width: usize,
     height: usize,
@@ -79,7 +79,7 @@ struct InScan<'a> {
 
 /// What a scan has of each block.
 #[derive(Clone, Copy)]
-struct Part {
+struct CoefficientRange {
     /// First and last coefficient, in zigzag order.
     first: usize,
     last: usize,
@@ -87,7 +87,7 @@ struct Part {
     has_runs: bool,
 }
 
-impl Part {
+impl CoefficientRange {
     const ALL: Self = Self {
         first: 0,
         last: BLOCK - 1,
@@ -98,7 +98,7 @@ impl Part {
 impl Walk<'_> {
     /// Where the first scan that lacks rows ends. `None` where there is none, or where a segment is not
     /// understood: the decoder reports it.
-    fn missing_rows(mut self, bytes: &[u8]) -> Option<Missing> {
+    fn missing_rows(mut self, bytes: &[u8]) -> Option<MissingRows> {
         let mut at = 2;
         loop {
             // Between segments, fill bytes and what belongs to no segment are skipped.
@@ -124,7 +124,7 @@ impl Walk<'_> {
                     self.restart_interval = usize::from(u16::from_be_bytes(*segment.first_chunk()?))
                 }
                 0xda => {
-                    let mut bits = Bits::new(bytes.get(at..)?);
+                    let mut bits = ScanBits::new(bytes.get(at..)?);
                     if let Some(missing) = self.scan(segment, &mut bits)? {
                         return Some(missing);
                     }
@@ -170,13 +170,13 @@ impl Walk<'_> {
     }
 
     /// Walks through a scan. `None` if it is not understood, `Some(None)` if it is whole.
-    fn scan(&self, segment: &[u8], bits: &mut Bits) -> Option<Option<Missing>> {
+    fn scan(&self, segment: &[u8], bits: &mut ScanBits) -> Option<Option<MissingRows>> {
         let (&[count], rest) = segment.split_first_chunk()?;
         let (selectors, rest) = rest.split_at_checked(2 * usize::from(count))?;
         let &[first, last, approximation] = rest.first_chunk()?;
         let part = match (self.is_progressive, approximation >> 4) {
-            (false, _) => Part::ALL,
-            (true, 0) => Part {
+            (false, _) => CoefficientRange::ALL,
+            (true, 0) => CoefficientRange {
                 first: usize::from(first),
                 last: usize::from(last).min(BLOCK - 1),
                 has_runs: true,
@@ -210,7 +210,7 @@ impl Walk<'_> {
         let scanned: Vec<InScan> = scanned.collect();
         let units = across * down;
         let found = self.units_found(&scanned, part, bits, units);
-        Some((found < units).then(|| Missing {
+        Some((found < units).then(|| MissingRows {
             row: (found / across * unit_rows).min(self.height),
             height: self.height,
         }))
@@ -237,7 +237,13 @@ impl Walk<'_> {
     }
 
     /// The units of a scan that can be decoded, at most `units`.
-    fn units_found(&self, scanned: &[InScan], part: Part, bits: &mut Bits, units: usize) -> usize {
+    fn units_found(
+        &self,
+        scanned: &[InScan],
+        part: CoefficientRange,
+        bits: &mut ScanBits,
+        units: usize,
+    ) -> usize {
         // Blocks without a bit of their own that follow in a progressive scan.
         let mut empty_blocks = 0;
         for unit in 0..units {
@@ -276,7 +282,7 @@ impl Walk<'_> {
 
 impl InScan<'_> {
     /// Skips a block, and returns the number of empty ones after it; `None` if a code is in no table.
-    fn skip_block(&self, part: Part, bits: &mut Bits) -> Option<u32> {
+    fn skip_block(&self, part: CoefficientRange, bits: &mut ScanBits) -> Option<u32> {
         let mut at = part.first;
         if at == 0 {
             let size = bits.symbol(self.dc?)?;
@@ -346,7 +352,7 @@ impl Huffman {
 }
 
 /// The bits of a scan up to the next marker, and zeros after them.
-struct Bits<'a> {
+struct ScanBits<'a> {
     bytes: &'a [u8],
     at: usize,
     /// The next bits, from the highest on.
@@ -356,7 +362,7 @@ struct Bits<'a> {
     padding: u32,
 }
 
-impl<'a> Bits<'a> {
+impl<'a> ScanBits<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         Self {
             bytes,
@@ -485,7 +491,7 @@ mod tests {
         memchr::memmem::find(bytes, &[0xff, marker]).unwrap()
     }
 
-    fn missing(bytes: &[u8]) -> Option<Missing> {
+    fn missing(bytes: &[u8]) -> Option<MissingRows> {
         Walk::default().missing_rows(bytes)
     }
 
@@ -525,7 +531,7 @@ mod tests {
         let mut bytes = jpeg(ExtendedColorType::L8);
         let frame = position(&bytes, 0xc0);
         bytes[frame + 5..frame + 7].copy_from_slice(&100_u16.to_be_bytes());
-        let error = check_rows(&bytes, &Account::default())
+        let error = check_rows(&bytes, &ReadBudget::default())
             .unwrap_err()
             .to_string();
         assert!(error.contains("row 40 of the 100"), "{error}");
@@ -548,7 +554,7 @@ mod tests {
                 }
             };
             let data: Vec<u8> = code.to_be_bytes().into_iter().flat_map(stuffed).collect();
-            assert_eq!(Bits::new(&data).symbol(&table), Some(length));
+            assert_eq!(ScanBits::new(&data).symbol(&table), Some(length));
         }
         assert!(Huffman::new(&[3; 16], &[0; 48]).is_none(), "too many codes");
     }

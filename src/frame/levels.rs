@@ -1,6 +1,6 @@
 //! From decoded samples to a frame: luminance, saturation and the step between grey levels.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
@@ -69,7 +69,7 @@ impl<'p> Frame<'p> {
             values,
             channels: 1,
         };
-        frame_from_integers(&samples, full_scale, &Account::default())
+        frame_from_integers(&samples, full_scale, &ReadBudget::default())
     }
 
     /// The luminance of a picture of 3 colors, whose samples are whole numbers, as of a file: pixel
@@ -89,7 +89,7 @@ impl<'p> Frame<'p> {
             values,
             channels,
         };
-        frame_from_integers(&samples, full_scale, &Account::default())
+        frame_from_integers(&samples, full_scale, &ReadBudget::default())
     }
 
     /// The same of samples that are floats, which have no step and no full scale.
@@ -101,7 +101,7 @@ impl<'p> Frame<'p> {
         channels: usize,
         values: Vec<f32>,
     ) -> Result<Self, FrameError> {
-        frame_from_floats(size, channels, values, &Account::default())
+        frame_from_floats(size, channels, values, &ReadBudget::default())
     }
 }
 
@@ -109,7 +109,7 @@ impl<'p> Frame<'p> {
 pub(super) fn frame_from_integers<T: WholeNumber>(
     samples: &LevelSamples<'_, T>,
     full_scale: T,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let (width, height) = (samples.width, samples.height);
     check_size(width, height)?;
@@ -200,7 +200,7 @@ pub(super) fn frame_from_floats(
     size: Size,
     channels: usize,
     values: Vec<f32>,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let samples = values.chunks_exact(channels);
     let pixels = match channels {

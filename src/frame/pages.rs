@@ -1,6 +1,6 @@
 //! All images of a file.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
@@ -58,11 +58,11 @@ impl Pages {
         Self::unpacked(bytes, &account)
     }
 
-    fn unpacked(bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
+    fn unpacked(bytes: Vec<u8>, account: &ReadBudget) -> Result<Self, FrameError> {
         no_panic(|| Self::counted(bytes, account))
     }
 
-    fn counted(mut bytes: Vec<u8>, account: &Account) -> Result<Self, FrameError> {
+    fn counted(mut bytes: Vec<u8>, account: &ReadBudget) -> Result<Self, FrameError> {
         if let Some(format) = FrameFormat::of(&bytes).filter(|format| format.is_compressed()) {
             let packed = std::mem::take(&mut bytes);
             bytes = compressed::unpack(&packed, format, account)?;

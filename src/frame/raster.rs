@@ -1,6 +1,6 @@
 //! PNG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
 
-use super::account::{Account, FLOATS_BYTES_PER_PIXEL, PIXELS_BETWEEN_CHECKS};
+use super::account::{FLOATS_BYTES_PER_PIXEL, PIXELS_BETWEEN_CHECKS, ReadBudget};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
@@ -18,7 +18,7 @@ use std::io::{Cursor, ErrorKind};
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_png(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Png;
     // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
@@ -44,7 +44,7 @@ pub(super) fn decode_png(bytes: &[u8], account: &Account) -> Result<Frame<'stati
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_bmp(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_bmp(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
@@ -65,7 +65,7 @@ pub(super) fn decode_bmp(bytes: &[u8], account: &Account) -> Result<Frame<'stati
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_pnm(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Pnm;
     let decoder = PnmDecoder::new(account.timed(Cursor::new(bytes)))
         .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
@@ -77,7 +77,7 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
         level.round() as u16
     };
     match (decoded.depth, u16::try_from(maxval)) {
-        (Depth::Eight, Ok(maxval @ 0..=0xff)) => {
+        (BitDepth::Eight, Ok(maxval @ 0..=0xff)) => {
             for levels in decoded.octets_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
                 account.check_time()?;
                 let unscaled = |v: &mut u8| *v = level((*v).into(), 0xff) as u8;
@@ -85,7 +85,7 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &Account) -> Result<Frame<'stati
             }
             decoded.integers(decoded.image.as_bytes(), maxval as u8, account)
         }
-        (Depth::Sixteen, Ok(maxval)) => {
+        (BitDepth::Sixteen, Ok(maxval)) => {
             for levels in decoded.words_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
                 account.check_time()?;
                 levels.iter_mut().for_each(|v| *v = level(*v, u16::MAX));
@@ -147,12 +147,12 @@ fn decode_with(
     exif: Option<&[u8]>,
     format: FrameFormat,
     found_bytes: usize,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let decoded = Decoded::new(decoder, format, found_bytes, account)?;
     let frame = match decoded.depth {
-        Depth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX, account),
-        Depth::Sixteen => decoded.integers(decoded.words(), u16::MAX, account),
+        BitDepth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX, account),
+        BitDepth::Sixteen => decoded.integers(decoded.words(), u16::MAX, account),
     }?;
     drop(decoded);
     let metadata = exif.map(|exif| exif::metadata(exif, frame.width));
@@ -161,7 +161,7 @@ fn decode_with(
 
 /// Bits per sample.
 #[derive(Clone, Copy)]
-enum Depth {
+enum BitDepth {
     Eight,
     Sixteen,
 }
@@ -170,7 +170,7 @@ enum Depth {
 struct Decoded {
     image: DynamicImage,
     channels: usize,
-    depth: Depth,
+    depth: BitDepth,
 }
 
 impl Decoded {
@@ -178,7 +178,7 @@ impl Decoded {
         decoder: impl ImageDecoder,
         format: FrameFormat,
         found_bytes: usize,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Self, FrameError> {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
@@ -189,9 +189,9 @@ impl Decoded {
         )?;
         let color = decoder.color_type();
         let depth = match color {
-            ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => Depth::Eight,
+            ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => BitDepth::Eight,
             ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
-                Depth::Sixteen
+                BitDepth::Sixteen
             }
             other => return Err(unsupported(format, format!("{other:?}"))),
         };
@@ -241,7 +241,7 @@ impl Decoded {
         &self,
         values: &[T],
         full_scale: T,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.image.width() as usize,

@@ -1,6 +1,6 @@
 //! Reads files and streams, and decodes them by their format.
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
@@ -73,7 +73,7 @@ impl Buffers {
         const BLUE: usize = 2;
         let page = self.color_page?;
         let decode = |channel: usize, held_bytes: u64| {
-            let account = Account::new(self.memory, Interrupt::default()).of_channel(channel);
+            let account = ReadBudget::new(self.memory, Interrupt::default()).of_channel(channel);
             account.hold(self.beside_bytes + held_bytes).ok()?;
             decode_with(&self.bytes, page, &account, Vec::new()).ok()
         };
@@ -90,15 +90,15 @@ impl Buffers {
 
     /// Whether there is room for the values of `frame`, which was read last, as floats beside it.
     pub(crate) fn check_floats(&self, frame: &Frame) -> Result<(), FrameError> {
-        let account = Account::new(self.memory_of_frame(), self.interrupt.clone());
+        let account = ReadBudget::new(self.memory_of_frame(), self.interrupt.clone());
         account.hold(frame.pixels.bytes())?;
         account.check_image(frame.size(), size_of::<f32>())
     }
 
     /// An account for one frame, whose file is in `bytes`.
-    pub(super) fn account(&mut self, bytes: usize) -> Result<Account, FrameError> {
+    pub(super) fn account(&mut self, bytes: usize) -> Result<ReadBudget, FrameError> {
         self.beside_bytes = bytes as u64;
-        let account = Account::new(self.memory, self.interrupt.clone());
+        let account = ReadBudget::new(self.memory, self.interrupt.clone());
         account.hold(self.beside_bytes)?;
         Ok(account)
     }
@@ -185,7 +185,7 @@ fn read_expected(
 pub(super) fn read_limited(
     stream: impl Read,
     expected: u64,
-    account: &Account,
+    account: &ReadBudget,
     bytes: &mut Vec<u8>,
 ) -> Result<(), FrameError> {
     let mut stream = account.timed(stream);
@@ -264,7 +264,7 @@ pub fn decode_page_with(
 fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &Account,
+    account: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     no_panic(|| match FrameFormat::of(bytes) {
@@ -286,10 +286,10 @@ pub(super) fn no_panic<R>(decode: impl FnOnce() -> Result<R, FrameError>) -> Res
 pub(super) fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &Account,
+    account: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    let single = |read: fn(&[u8], &Account) -> Result<Frame<'static>, FrameError>| match page {
+    let single = |read: fn(&[u8], &ReadBudget) -> Result<Frame<'static>, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
         _ => read(bytes, account),
     };

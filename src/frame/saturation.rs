@@ -71,7 +71,7 @@ pub(crate) struct SaturationFinder {
     pixels: Vec<BrightPixel>,
     is_seen: Vec<bool>,
     open: Vec<usize>,
-    sources: Vec<Source>,
+    sources: Vec<BrightRegion>,
 }
 
 impl SaturationFinder {
@@ -137,7 +137,7 @@ impl SaturationFinder {
             if std::mem::replace(&mut is_seen[first], true) {
                 continue;
             }
-            let mut source = Source::default();
+            let mut source = BrightRegion::default();
             open.push(first);
             while let Some(index) = open.pop() {
                 let pixel = pixels[index];
@@ -225,7 +225,7 @@ struct BrightPixel {
 
 /// Connected bright pixels.
 #[derive(Debug, Clone, Copy)]
-struct Source {
+struct BrightRegion {
     /// The highest level.
     peak: f32,
     /// Pixels at the frame's highest level.
@@ -234,7 +234,7 @@ struct Source {
     below_top: usize,
 }
 
-impl Default for Source {
+impl Default for BrightRegion {
     fn default() -> Self {
         Self {
             peak: f32::NEG_INFINITY,
@@ -246,7 +246,7 @@ impl Default for Source {
 
 /// How high the sources near a frame's highest level are.
 struct Heights<'a> {
-    sources: &'a [Source],
+    sources: &'a [BrightRegion],
     /// The highest level.
     top: f32,
     /// How far below it the sources reach.
@@ -288,7 +288,7 @@ impl Heights<'_> {
 
     /// The chance that so many sources end at most `thickness` below the top.
     fn log10_chance_within(&self, thickness: f32) -> f64 {
-        let is_within = |source: &&Source| source.peak >= self.top - thickness;
+        let is_within = |source: &&BrightRegion| source.peak >= self.top - thickness;
         let within = self.sources.iter().filter(is_within).count();
         self.log10_chance(within, self.sources.len() - within, thickness)
     }

@@ -51,5 +51,5 @@ pub use priors::{
     DateSource, DateZone, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
 };
 pub(crate) use search::LOG10_FALSE_ALARM_LIMIT;
-pub use workspace::{NAME_ODDS, Pointing};
+pub use workspace::{NAME_ODDS, PointedField};
 pub use workspace::{Workspace, identify};

@@ -16,8 +16,8 @@ use crate::identify::index::IndexedCatalog;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
 use crate::identify::search::{
-    Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers, SearchPlan, Thinning, Tiers, Window,
-    Windows,
+    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, SearchBuffers, SearchPlan, SearchWindow, Thinning,
+    Tiers, TriangleSearch, Windows,
 };
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -179,7 +179,7 @@ impl Workspace {
         field: &'a StarField,
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
-    ) -> Result<Pointing<'w, 'a>, SearchFailure> {
+    ) -> Result<PointedField<'w, 'a>, SearchFailure> {
         self.find_pointing_with(field, None, priors, sky)
     }
 
@@ -190,7 +190,7 @@ impl Workspace {
         coarser: Option<&'a dyn CoarserFields>,
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
-    ) -> Result<Pointing<'w, 'a>, SearchFailure> {
+    ) -> Result<PointedField<'w, 'a>, SearchFailure> {
         #[cfg(debug_assertions)]
         super::planted::panic_if_asked(field);
         if field.stars.len() < MIN_STARS {
@@ -212,7 +212,7 @@ impl Workspace {
             Some(_) => SearchPlan::quick(*effort),
             None => SearchPlan::brightest(*effort),
         };
-        let mut search = Search::new(whole, first, priors, *effort, buffers);
+        let mut search = TriangleSearch::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
         if found.is_none() {
@@ -233,7 +233,7 @@ impl Workspace {
             }
         };
         let found = found.ok_or(failure)?;
-        Ok(Pointing {
+        Ok(PointedField {
             most_chance: 1.0 / (1.0 + *name_odds),
             problem: whole,
             found,
@@ -262,27 +262,27 @@ impl Others {
         whole: Problem<'a>,
         coarser: Option<&'a dyn CoarserFields>,
         effort: Effort,
-    ) -> impl Iterator<Item = Choice<'a>> {
+    ) -> impl Iterator<Item = FurtherSearch<'a>> {
         let of = move |field| Problem { field, ..whole };
         let coarse = coarser.into_iter().flat_map(move |coarser| {
             let fields = (0..coarser.count()).filter_map(move |number| coarser.field(number));
-            fields.map(move |field| Choice::new(of(field), SearchPlan::coarse(effort)))
+            fields.map(move |field| FurtherSearch::new(of(field), SearchPlan::coarse(effort)))
         });
-        let of_whole = coarser.map(move |_| Choice::new(whole, SearchPlan::votes(effort)));
+        let of_whole = coarser.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
         let windows = self.windows.of(whole.field).iter().map(move |window| {
             let plan = if window.is_main {
                 SearchPlan::coarse(effort)
             } else {
                 SearchPlan::window(effort)
             };
-            Choice {
+            FurtherSearch {
                 window: Some(window),
-                ..Choice::new(of(&window.field), plan)
+                ..FurtherSearch::new(of(&window.field), plan)
             }
         });
         let thinned = self.thinning.thin(whole.field);
         let other_stars = SearchPlan::other_stars(effort);
-        let thinned = thinned.map(move |field| Choice::new(of(field), other_stars));
+        let thinned = thinned.map(move |field| FurtherSearch::new(of(field), other_stars));
         let tiers = self
             .tiers
             .below(whole.field, effort.tiers())
@@ -292,7 +292,7 @@ impl Others {
                     brighter: tier.brighter,
                     ..of(&tier.field)
                 };
-                Choice::new(problem, SearchPlan::tier(effort))
+                FurtherSearch::new(problem, SearchPlan::tier(effort))
             });
         coarse
             .chain(of_whole)
@@ -303,14 +303,14 @@ impl Others {
 }
 
 /// What else is searched where the brightest stars of a field do not identify it.
-struct Choice<'a> {
+struct FurtherSearch<'a> {
     problem: Problem<'a>,
     plan: SearchPlan,
     /// The window of the frame that it is.
-    window: Option<&'a Window>,
+    window: Option<&'a SearchWindow>,
 }
 
-impl<'a> Choice<'a> {
+impl<'a> FurtherSearch<'a> {
     fn new(problem: Problem<'a>, plan: SearchPlan) -> Self {
         Self {
             problem,
@@ -322,10 +322,10 @@ impl<'a> Choice<'a> {
     /// Searches it, after `search`, for the pointing of the `whole` frame.
     fn search(
         &self,
-        search: Search<'a>,
+        search: TriangleSearch<'a>,
         whole: Problem<'a>,
         priors: &Priors,
-    ) -> (Search<'a>, Option<Found>) {
+    ) -> (TriangleSearch<'a>, Option<FoundHypothesis>) {
         let Some(window) = self.window else {
             let mut search = search.again(self.problem, self.plan, priors);
             let found = search.run();
@@ -341,19 +341,19 @@ impl<'a> Choice<'a> {
 }
 
 /// A field whose pointing is found, and whose stars have no names yet.
-pub struct Pointing<'w, 'a> {
+pub struct PointedField<'w, 'a> {
     /// The largest probability of a name that it is chance.
     most_chance: f64,
     problem: Problem<'a>,
-    search: Search<'a>,
-    found: Found,
+    search: TriangleSearch<'a>,
+    found: FoundHypothesis,
     /// What to say where the stars do not confirm the pointing after all.
     failure: SearchFailure,
     bright: &'w mut Brightest,
     answer: &'w mut Option<Identification>,
 }
 
-impl<'w> Pointing<'w, '_> {
+impl<'w> PointedField<'w, '_> {
     /// Names every star that can be named with the odds of the workspace, and fits attitude and
     /// optics to all of these.
     ///
@@ -452,11 +452,11 @@ fn answered<'a>(
 /// of them, and at last with the search's own answer; the fit with most names counts.
 fn with_names(
     problem: Problem,
-    search: &mut Search,
+    search: &mut TriangleSearch,
     found: &Refined,
     most_chance: f64,
 ) -> Option<(Refined, f64)> {
-    let mut best: Option<Named> = None;
+    let mut best: Option<NamedFit> = None;
     for start in CALIBRATION_STARS.map(Some).into_iter().chain([None]) {
         let settled = match start {
             Some(stars) => settle(problem, search, found, stars),
@@ -485,10 +485,10 @@ fn with_names(
 /// more; the search keeps these names.
 fn named_outwards(
     problem: Problem,
-    search: &mut Search,
-    mut best: Named,
+    search: &mut TriangleSearch,
+    mut best: NamedFit,
     most_chance: f64,
-) -> Named {
+) -> NamedFit {
     /// Largest distance of true pairs, in diagonals of the frame.
     const RADIUS_SHARE: f64 = 0.002;
     const MAX_ROUNDS: usize = 3;
@@ -519,14 +519,19 @@ fn named_outwards(
 }
 
 /// A fit to the stars with sure names.
-struct Named {
+struct NamedFit {
     refined: Refined,
     log10: f64,
     names: usize,
 }
 
 /// Fits as much distortion as the `stars` brightest stars support.
-fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) -> Option<Refined> {
+fn settle(
+    problem: Problem,
+    search: &mut TriangleSearch,
+    found: &Refined,
+    stars: usize,
+) -> Option<Refined> {
     let field = problem.field;
     let diagonal_px = libm::hypot(field.width_px, field.height_px);
     let area_px2 = field.width_px * field.height_px;
@@ -548,10 +553,10 @@ fn settle(problem: Problem, search: &mut Search, found: &Refined, stars: usize) 
 /// Names all stars, from `settled` on; `None` where too few have a sure name.
 fn name(
     problem: Problem,
-    search: &mut Search,
+    search: &mut TriangleSearch,
     settled: &Refined,
     most_chance: f64,
-) -> Option<Named> {
+) -> Option<NamedFit> {
     let refiner = search.refiner();
     let of_all = NamingStart {
         most_chance,
@@ -562,7 +567,7 @@ fn name(
     let names = refiner.pairs.len();
     let log10 = search.log10_of_answer(problem.field, &refined.hypothesis())?;
     let is_sure = names >= MIN_STARS && log10 <= LOG10_FALSE_ALARM_LIMIT;
-    is_sure.then_some(Named {
+    is_sure.then_some(NamedFit {
         refined,
         log10,
         names,

@@ -22,7 +22,7 @@ const BEGUN: f64 = 1.0 / 3.0;
 
 /// A part of a series that is not usual.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Departure {
+pub(super) struct DetectedChange {
     /// First value of it.
     pub start: usize,
     /// First value after it; `None` if the series ends with it.
@@ -30,7 +30,7 @@ pub(super) struct Departure {
 }
 
 /// Where `values` depart by `least_step` or more. Values that are not known are passed over.
-pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departure> {
+pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<DetectedChange> {
     let known = values.iter().enumerate();
     let known: Vec<(usize, f64)> = known
         .filter_map(|(at, value)| Some((at, (*value)?)))
@@ -39,7 +39,7 @@ pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departu
         return Vec::new();
     };
     let is_begun = |value: f64| value > usual + BEGUN * (limit - usual);
-    let mut found: Vec<Departure> = Vec::new();
+    let mut found: Vec<DetectedChange> = Vec::new();
     let mut is_away = false;
     for (at, window) in known.windows(IN_A_ROW).enumerate() {
         if !is_away && window.iter().all(|(_, value)| *value > limit) {
@@ -48,7 +48,7 @@ pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<Departu
             let begun = begun.take_while(|(start, value)| *start > before && is_begun(*value));
             let begun = begun.last();
             let start = begun.unwrap_or(&window[0]).0;
-            found.push(Departure { start, end: None });
+            found.push(DetectedChange { start, end: None });
             is_away = true;
         } else if is_away && window.iter().all(|(_, value)| *value <= limit) {
             let over = window.iter().find(|(_, value)| !is_begun(*value));
@@ -93,7 +93,7 @@ mod tests {
         values.extend(some(&[2.0, 2.1, 2.0, 2.2]));
         values.push(None);
         values.extend(some(&[0.0, 0.1, 0.0, 0.1]));
-        let expected = Departure {
+        let expected = DetectedChange {
             start: 10,
             end: Some(15),
         };

@@ -23,7 +23,7 @@ const ORANGE: &str = "#d55e00";
 const GREEN: &str = "#009e73";
 
 /// A line or points of a plot.
-struct Layer {
+struct NightPlotLayer {
     name: &'static str,
     color: &'static str,
     value: fn(&NightRow) -> Option<f64>,
@@ -32,7 +32,7 @@ struct Layer {
 /// A plot over time.
 struct Plot {
     title: &'static str,
-    layers: &'static [Layer],
+    layers: &'static [NightPlotLayer],
     /// Bounds of the values; `None` for those that there are.
     bounds: Option<[f64; 2]>,
 }
@@ -40,7 +40,7 @@ struct Plot {
 const PLOTS: [Plot; 5] = [
     Plot {
         title: "Zenith, V magnitude of a square arcsecond",
-        layers: &[Layer {
+        layers: &[NightPlotLayer {
             name: "",
             color: BLUE,
             value: |row| row.zenith_mag_arcsec2,
@@ -49,7 +49,7 @@ const PLOTS: [Plot; 5] = [
     },
     Plot {
         title: "Sky behind clouds, %",
-        layers: &[Layer {
+        layers: &[NightPlotLayer {
             name: "",
             color: BLUE,
             value: |row| row.cloud_share.map(|share| 100.0 * share),
@@ -59,17 +59,17 @@ const PLOTS: [Plot; 5] = [
     Plot {
         title: "Limits, V magnitude",
         layers: &[
-            Layer {
+            NightPlotLayer {
                 name: "measured",
                 color: BLUE,
                 value: |row| row.limit_vmag,
             },
-            Layer {
+            NightPlotLayer {
                 name: "expected",
                 color: ORANGE,
                 value: |row| row.expected_limit_vmag,
             },
-            Layer {
+            NightPlotLayer {
                 name: "unaided eye",
                 color: GREEN,
                 value: |row| row.naked_eye_limit_vmag,
@@ -80,7 +80,7 @@ const PLOTS: [Plot; 5] = [
     Plot {
         title: "Magnitudes",
         layers: &[
-            Layer {
+            NightPlotLayer {
                 name: "extinction per airmass",
                 color: BLUE,
                 value: |row| {
@@ -88,7 +88,7 @@ const PLOTS: [Plot; 5] = [
                         .filter(|_| row.extinction_measured)
                 },
             },
-            Layer {
+            NightPlotLayer {
                 name: "stars dimmer than at their best",
                 color: ORANGE,
                 value: |row| row.dimming_mag,
@@ -98,7 +98,7 @@ const PLOTS: [Plot; 5] = [
     },
     Plot {
         title: "Spot, pixels (standard deviation)",
-        layers: &[Layer {
+        layers: &[NightPlotLayer {
             name: "",
             color: BLUE,
             value: |row| row.spot_sigma_px.filter(|_| row.is_identified()),

@@ -16,7 +16,7 @@ use crate::base::statistics::{SIGMA_PER_MAD, median, median_of};
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::observer::Site;
 use crate::frame::{Frame, RowOrder};
-use crate::pipeline::HeldCamera;
+use crate::pipeline::FixedCamera;
 use nalgebra::{Rotation3, Unit, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -49,7 +49,7 @@ pub struct NightHotPixel {
 
 /// Pixels that stand out in one frame.
 #[derive(Debug, Clone)]
-pub struct Standouts {
+pub struct OutlierPixels {
     size: [usize; 2],
     row_order: RowOrder,
     mjd: Option<f64>,
@@ -57,7 +57,7 @@ pub struct Standouts {
     pixels: Vec<(usize, f32)>,
 }
 
-impl Standouts {
+impl OutlierPixels {
     /// Those of a frame in the rows of its file, which was taken at `mjd`.
     pub fn of(frame: &Frame, mjd: Option<f64>) -> Self {
         /// One of so many pixels tells the noise.
@@ -104,12 +104,12 @@ fn above_others_adu(frame: &Frame, x: usize, y: usize) -> [f32; 2] {
 
 /// The hot pixels of frames of one size; `None` where they are too few.
 pub fn hot_pixels(
-    frames: &[Standouts],
-    held: Option<&HeldCamera>,
+    frames: &[OutlierPixels],
+    held: Option<&FixedCamera>,
     site: Option<Site>,
 ) -> Option<Vec<NightHotPixel>> {
     let first = frames.first()?;
-    let frames: Vec<&Standouts> = frames
+    let frames: Vec<&OutlierPixels> = frames
         .iter()
         .filter(|frame| frame.size == first.size)
         .collect();
@@ -123,7 +123,7 @@ pub fn hot_pixels(
             .or_default()
             .push(f64::from(*excess_adu));
     }
-    let motion = Motion::of(&frames, held, site);
+    let motion = SkyMotion::of(&frames, held, site);
     let [width, height] = first.size;
     let hot = |(index, mut excess_adu): (usize, Vec<f64>)| {
         let share = excess_adu.len() as f64 / frames.len() as f64;
@@ -145,13 +145,17 @@ pub fn hot_pixels(
 }
 
 /// How the sky moves from the first frame to the last.
-struct Motion<'a> {
-    held: &'a HeldCamera,
+struct SkyMotion<'a> {
+    held: &'a FixedCamera,
     turn: Rotation3<f64>,
 }
 
-impl<'a> Motion<'a> {
-    fn of(frames: &[&Standouts], held: Option<&'a HeldCamera>, site: Option<Site>) -> Option<Self> {
+impl<'a> SkyMotion<'a> {
+    fn of(
+        frames: &[&OutlierPixels],
+        held: Option<&'a FixedCamera>,
+        site: Option<Site>,
+    ) -> Option<Self> {
         let dates = || frames.iter().filter_map(|frame| frame.mjd);
         let days =
             dates().fold(f64::NEG_INFINITY, f64::max) - dates().fold(f64::INFINITY, f64::min);
@@ -198,7 +202,8 @@ mod tests {
 
     #[test]
     fn what_stays_is_hot_and_what_moves_is_a_star() {
-        let frames: Vec<Standouts> = (0..8).map(|n| Standouts::of(&frame(n), None)).collect();
+        let frames: Vec<OutlierPixels> =
+            (0..8).map(|n| OutlierPixels::of(&frame(n), None)).collect();
         assert!(frames.iter().all(|frame| frame.pixels.len() == 2));
         let found = hot_pixels(&frames, None, None).unwrap();
         let [pixel] = found[..] else {

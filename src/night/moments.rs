@@ -2,8 +2,8 @@
 
 use super::almanac::Almanac;
 use super::cells::{NightCells, middles_deg};
-use super::departure::{Departure, departures};
-use super::pointing::Knock;
+use super::departure::{DetectedChange, departures};
+use super::pointing::PointingJump;
 use super::row::NightRow;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::finite;
@@ -111,13 +111,13 @@ fn compass(azimuth_deg: f64) -> &'static str {
 }
 
 /// Rows of a night and their dates.
-pub(super) struct Series<'a> {
+pub(super) struct DatedRows<'a> {
     rows: &'a [NightRow],
     /// Number, date and Modified Julian Date of those that have one.
     dated: Vec<(usize, ObservationDate, f64)>,
 }
 
-impl<'a> Series<'a> {
+impl<'a> DatedRows<'a> {
     pub(super) fn new(rows: &'a [NightRow]) -> Self {
         let dated = rows.iter().enumerate();
         let dated = dated.filter_map(|(at, row)| Some((at, row.observed()?, row.mjd?)));
@@ -128,7 +128,7 @@ impl<'a> Series<'a> {
     }
 
     /// All moments, in the order of their dates.
-    pub(super) fn moments(&self, site: Option<Site>, knocks: &[Knock]) -> Vec<Moment> {
+    pub(super) fn moments(&self, site: Option<Site>, knocks: &[PointingJump]) -> Vec<Moment> {
         let mut all = site.map_or(Vec::new(), |site| self.of_almanac(site));
         all.extend(self.clouds());
         all.extend(self.optics());
@@ -158,7 +158,7 @@ impl<'a> Series<'a> {
         let shares: Vec<Option<f64>> = self.rows.iter().map(|row| row.cloud_share).collect();
         let known = |at: &usize| self.rows[*at].cells.is_some();
         let mut moments = Vec::new();
-        for Departure { start, end } in departures(&shares, LEAST_CLOUDS) {
+        for DetectedChange { start, end } in departures(&shares, LEAST_CLOUDS) {
             let clear = (0..start).rev().filter(known).take(COMPARED);
             let cloudy = (start..self.rows.len()).filter(known).take(BEGINNING);
             let come = self.at(MomentKind::CloudsCome, start).map(|moment| Moment {
@@ -233,8 +233,8 @@ impl<'a> Series<'a> {
         let widths = of(|row| row.spot_sigma_px.filter(|px| *px > 0.0).map(libm::log));
         let wider = departures(&widths, LEAST_WIDENING);
         let dimmer = departures(&of(|row| row.dimming_mag), LEAST_DIMMING_MAG);
-        let meets = |a: &Departure, b: &Departure| {
-            let last = |departure: &Departure| departure.end.unwrap_or(self.rows.len());
+        let meets = |a: &DetectedChange, b: &DetectedChange| {
+            let last = |departure: &DetectedChange| departure.end.unwrap_or(self.rows.len());
             a.start < last(b) && b.start < last(a)
         };
         let mut moments = Vec::new();

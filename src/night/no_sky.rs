@@ -53,7 +53,7 @@ impl NoSky {
         if matches!(solution.outcome, Outcome::Identified(_)) {
             return None;
         }
-        let light = Light::of(frame);
+        let light = LightStatistics::of(frame);
         if light.is_bright() && shows_day(name, solution, frame, &light) {
             Some(Self::Day)
         } else if has_word(name, &["dark", "darks", "bias", "masterdark"]) || light.is_even() {
@@ -65,7 +65,7 @@ impl NoSky {
 }
 
 /// Whether a bright frame without stars is of the day.
-fn shows_day(name: &Path, solution: &Solution, frame: &Frame, light: &Light) -> bool {
+fn shows_day(name: &Path, solution: &Solution, frame: &Frame, light: &LightStatistics) -> bool {
     /// Share of saturated pixels that no sky of the night reaches.
     const MOST_SATURATED: f64 = 0.3;
     /// No sky of the night is bright in so short an exposure, in seconds.
@@ -107,7 +107,7 @@ fn has_word(name: &Path, words: &[&str]) -> bool {
 }
 
 /// How light is spread over a frame, in ADU.
-struct Light {
+struct LightStatistics {
     median: f64,
     /// Level at which pixels are saturated, where the format has one.
     full: Option<f64>,
@@ -124,7 +124,7 @@ struct Light {
 /// Parts along each side.
 const PARTS: usize = 8;
 
-impl Light {
+impl LightStatistics {
     fn of(frame: &Frame) -> Self {
         let full = frame.saturation_adu.map(f64::from).or(match frame.pixels {
             Pixels::U8(_) => Some(255.0),
@@ -200,7 +200,7 @@ fn noise(frame: &Frame) -> f64 {
 ///
 /// # Reference
 /// Bigün & Granlund 1987, Proc. 1st ICCV, 433: coherence of the structure tensor.
-fn is_trailed(frame: &Frame, light: &Light) -> bool {
+fn is_trailed(frame: &Frame, light: &LightStatistics) -> bool {
     const SIGMAS: f64 = 10.0;
     const AROUND: usize = 7;
     const COHERENT: f64 = 0.7;
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn stars_are_told_from_their_trails() {
-        let told = |frame: &Frame| is_trailed(frame, &Light::of(frame));
+        let told = |frame: &Frame| is_trailed(frame, &LightStatistics::of(frame));
         assert!(!told(&frame(stars)));
         assert!(told(&frame(trails)));
         assert!(!told(&frame(|x, y| circle(x, y, 60.0))));
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_dark_is_even_and_a_clouded_sky_is_not() {
-        assert!(Light::of(&frame(|_, _| 10.0)).is_even());
+        assert!(LightStatistics::of(&frame(|_, _| 10.0)).is_even());
         let hot = |x: f64, y: f64| {
             if (x * 7.0 + y) % 97.0 == 0.0 {
                 200.0
@@ -336,20 +336,20 @@ mod tests {
                 10.0
             }
         };
-        assert!(Light::of(&frame(hot)).is_even());
+        assert!(LightStatistics::of(&frame(hot)).is_even());
         for sky in [
             frame(|x, y| circle(x, y, 60.0)),
             frame(|x, _| 20.0 + x / 20.0),
         ] {
-            assert!(!Light::of(&sky).is_even());
+            assert!(!LightStatistics::of(&sky).is_even());
         }
     }
 
     #[test]
     fn only_bright_frames_are_of_the_day() {
-        assert!(Light::of(&frame(|x, y| circle(x, y, 160.0))).is_bright());
-        assert!(!Light::of(&frame(stars)).is_bright());
-        let white = Light::of(&frame(|_, _| 260.0));
+        assert!(LightStatistics::of(&frame(|x, y| circle(x, y, 160.0))).is_bright());
+        assert!(!LightStatistics::of(&frame(stars)).is_bright());
+        let white = LightStatistics::of(&frame(|_, _| 260.0));
         assert!(white.saturated > 0.9 && white.is_bright());
     }
 

@@ -20,7 +20,7 @@ const LEAST_RAD: f64 = 120.0 * RAD_PER_ARCSEC;
 /// A moment at which the camera was moved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Knock {
+pub struct PointingJump {
     /// Number of the first frame after it, from 0.
     pub frame: usize,
     /// Angle by which the camera was turned, in degrees.
@@ -43,7 +43,7 @@ pub struct PointingHistory {
     recent: VecDeque<Pointed>,
     /// The last frames that do not agree with what is held.
     suspects: Vec<Pointed>,
-    knocks: Vec<Knock>,
+    knocks: Vec<PointingJump>,
 }
 
 impl PointingHistory {
@@ -64,7 +64,7 @@ impl PointingHistory {
     }
 
     /// When the camera was moved.
-    pub fn knocks(&self) -> &[Knock] {
+    pub fn knocks(&self) -> &[PointingJump] {
         &self.knocks
     }
 
@@ -117,7 +117,7 @@ impl PointingHistory {
         }
         // Without a pointing that was confirmed there is none that was left.
         if !self.recent.is_empty() {
-            self.knocks.push(Knock {
+            self.knocks.push(PointingJump {
                 frame: self.suspects[0].frame,
                 shift_deg: held.angle_to(&now.pointing) * DEG_PER_RAD,
             });

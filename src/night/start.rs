@@ -6,7 +6,7 @@ use crate::camera::KnownLens;
 use crate::ephemeris::observer::Site;
 use crate::identify::lens::{LensFrame, calibrate};
 use crate::identify::{DateZone, Identification};
-use crate::pipeline::{HeldCamera, Outcome, Solution};
+use crate::pipeline::{FixedCamera, Outcome, Solution};
 use crate::sky::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
 use jiff::SignedDuration;
 use std::sync::Arc;
@@ -85,7 +85,7 @@ pub struct NightStart {
     /// The lens.
     pub lens: Option<Arc<KnownLens>>,
     /// How the camera stands, and its clear sky.
-    pub held: Option<HeldCamera>,
+    pub held: Option<FixedCamera>,
     /// Zero point through one airmass in the clearest of the frames whose exposure is known, in V.
     pub clear_ground_vmag: Option<f64>,
     /// Whether frames do not tell the level of a pixel without light.
@@ -125,7 +125,7 @@ impl NightStart {
         let lens = known.or_else(|| measured_lens(probes));
         let held = first
             .zip(lens.as_ref())
-            .map(|((_, pointing, sigma_rad), lens)| HeldCamera {
+            .map(|((_, pointing, sigma_rad), lens)| FixedCamera {
                 camera: *lens.camera(),
                 pointing,
                 sigma_rad,
@@ -149,7 +149,7 @@ impl NightStart {
     #[must_use]
     pub fn with_dark_level(self, dark: Option<DarkLevel>) -> Self {
         Self {
-            held: self.held.map(|held| HeldCamera { dark, ..held }),
+            held: self.held.map(|held| FixedCamera { dark, ..held }),
             ..self
         }
     }

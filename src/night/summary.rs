@@ -1,7 +1,7 @@
 //! A night in a few numbers.
 
-use super::moments::{Moment, Series};
-use super::pointing::Knock;
+use super::moments::{DatedRows, Moment};
+use super::pointing::PointingJump;
 use super::row::NightRow;
 use crate::base::format::finite;
 use crate::base::statistics::{median, median_of};
@@ -38,7 +38,7 @@ pub struct NightSummary {
     pub clear_dark_hours: Option<f64>,
     pub darkest_hour: Option<DarkestHour>,
     pub median: Medians,
-    pub knocks: Vec<Knock>,
+    pub knocks: Vec<PointingJump>,
     pub moments: Vec<Moment>,
     pub hot_pixels: Option<usize>,
     pub site_or_time: Option<String>,
@@ -87,7 +87,7 @@ pub struct MapCell {
 }
 
 /// The summary of `rows`, in the order of their dates, without those of frames that were passed over.
-pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> NightSummary {
+pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[PointingJump]) -> NightSummary {
     let count = |is: fn(&NightRow) -> bool| rows.iter().filter(|row| is(row)).count();
     let hours = |is: fn(&NightRow) -> bool| hours_of(rows, is).and_then(|hours| finite(hours, 3));
     let judged = count(|row| row.cloud_share.is_some());
@@ -129,7 +129,7 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[Knock]) -> Nig
             cloud_share: median_of_rows(rows, |row| row.cloud_share),
             spot_sigma_px: median_of_rows(rows, |row| row.spot_sigma_px),
         },
-        moments: Series::new(rows).moments(site, knocks),
+        moments: DatedRows::new(rows).moments(site, knocks),
         knocks: knocks.to_vec(),
         hot_pixels: None,
         site_or_time: None,

@@ -47,7 +47,7 @@ pub(crate) fn resolved_px(spot_sigma_px: f64) -> f64 {
 }
 
 /// The other stars around a star.
-struct Surroundings {
+struct Crowding {
     /// Whether none of them is bright enough to crowd it.
     is_single: bool,
     /// Light, in the star's flux and over its own, of those without a detection of their own, above what is in the
@@ -131,7 +131,7 @@ pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
     let width_px = (spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
     let faint_light = FaintLight::of(predicted, &detections, width_px, resolved_px);
     let surroundings = |index: usize, star: &PredictedStar| {
-        let mut around = Surroundings {
+        let mut around = Crowding {
             is_single: true,
             undetected_light: 0.0,
         };

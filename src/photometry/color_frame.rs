@@ -97,7 +97,7 @@ fn fluxes_adu<const KINDS: usize>(
         cdf(0.5) - cdf(-0.5)
     };
     let across: Vec<f64> = columns.clone().map(|x| share(x, star.x)).collect();
-    let mut sums = [Sums::default(); KINDS];
+    let mut sums = [FilterSums::default(); KINDS];
     for y in rows {
         let down = share(y, star.y);
         for (x, across) in columns.clone().zip(&across) {
@@ -111,7 +111,7 @@ fn fluxes_adu<const KINDS: usize>(
 
 /// Sums over the pixels behind a filter, for the line of their levels over the share of a spot in each.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct FilterSums {
     count: f64,
     share: f64,
     share_sq: f64,
@@ -119,7 +119,7 @@ struct Sums {
     both: f64,
 }
 
-impl Sums {
+impl FilterSums {
     fn add(&mut self, share: f64, level: f64) {
         self.count += 1.0;
         self.share += share;

@@ -156,7 +156,7 @@ pub(crate) fn measure(stars: &[CountedStar], chance: f64) -> Completeness {
         let order = a.v_mag.total_cmp(&b.v_mag);
         order.then(b.detected.cmp(&a.detected))
     });
-    let fit = Curve::fit(&stars, chance);
+    let fit = CompletenessCurve::fit(&stars, chance);
     Completeness {
         bins: bins(&stars),
         limit: limit(&stars, fit.as_ref()),
@@ -217,7 +217,7 @@ fn limit(stars: &[CountedStar], fit: Option<&CurveFit>) -> Result<Limit, NoLimit
 
 /// The parameters of the curve, transformed so that they are unbounded.
 #[derive(Debug, Clone, Copy)]
-struct Curve {
+struct CompletenessCurve {
     v_mag: f64,
     ln_width: f64,
     logit_lost: f64,
@@ -226,7 +226,7 @@ struct Curve {
 
 /// A fitted curve, and the standard error of its m₅₀.
 struct CurveFit {
-    curve: Curve,
+    curve: CompletenessCurve,
     sigma_mag: Option<f64>,
 }
 
@@ -237,7 +237,7 @@ struct Likelihood {
     fit: LinearFit<3>,
 }
 
-impl Curve {
+impl CompletenessCurve {
     /// Fits the curve to `stars`, brightest first, by damped Fisher scoring.
     fn fit(stars: &[CountedStar], chance: f64) -> Option<CurveFit> {
         const MAX_ROUNDS: usize = 60;

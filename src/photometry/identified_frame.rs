@@ -5,7 +5,7 @@ use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detections;
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::Identification;
-use crate::photometry::comparison::FieldPlace;
+use crate::photometry::comparison::FieldPosition;
 
 /// An identified frame.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +39,7 @@ impl IdentifiedFrame<'_> {
     }
 
     /// Places all over a wide field whose horizon is known, as far as they show the sky.
-    pub fn places_of_horizon(&self) -> Option<Vec<FieldPlace>> {
+    pub fn places_of_horizon(&self) -> Option<Vec<FieldPosition>> {
         /// Along each side.
         const PLACES: usize = 25;
         /// From one place to the next: any few in a row lie all over the frame.
@@ -58,12 +58,12 @@ impl IdentifiedFrame<'_> {
             let pixel = PixelPoint::new(x * camera.width_px - 0.5, y * camera.height_px - 0.5);
             let is_seen = self.detections.shows_sky(&pixel);
             let limit_adu = self.flux_limit_adu(&pixel).filter(|_| is_seen)?;
-            Some(FieldPlace {
+            Some(FieldPosition {
                 brighter_mag: 2.5 * libm::log10(limit_adu / typical_adu),
                 airmass_ratio: airmass(&pixel)? / central_airmass,
             })
         };
-        let places: Vec<FieldPlace> = (0..PLACES * PLACES).filter_map(place).collect();
+        let places: Vec<FieldPosition> = (0..PLACES * PLACES).filter_map(place).collect();
         (!places.is_empty()).then_some(places)
     }
 }

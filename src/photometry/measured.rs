@@ -9,7 +9,7 @@ pub(crate) const MAG_PER_RELATIVE: f64 = 1.085_736_204_758_13;
 
 /// A star's brightness in a frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Measured {
+pub(crate) struct MeasuredMagnitude {
     /// −2.5 log10 of its flux, in ADU/s where the exposure is known, without its neighbors' light and what the
     /// lens takes.
     pub instrumental_mag: f64,
@@ -17,7 +17,7 @@ pub(crate) struct Measured {
     pub sigma_mag: f64,
 }
 
-impl Measured {
+impl MeasuredMagnitude {
     /// That of a detection.
     pub fn of(frame: &IdentifiedFrame, star: &FrameStar, detection: &Detection) -> Self {
         let flux_adu = detection.flux_adu

@@ -36,7 +36,7 @@ use crate::detect::Detection;
 use crate::identify::{IndexedCatalog, SkyView};
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
-pub(crate) use measured::{MAG_PER_RELATIVE, Measured};
+pub(crate) use measured::{MAG_PER_RELATIVE, MeasuredMagnitude};
 use standards::Standards;
 use zero_point::{NoZeroPoint, ZeroPoint};
 

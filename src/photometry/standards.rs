@@ -6,7 +6,7 @@
 use super::association::FrameStar;
 use super::completeness::Fall;
 use super::identified_frame::IdentifiedFrame;
-use super::measured::Measured;
+use super::measured::MeasuredMagnitude;
 use super::zero_point::{MIN_STARS, NoZeroPoint, StandardStar};
 use crate::detect::Detection;
 use crate::identify::IndexedCatalog;
@@ -79,7 +79,7 @@ fn standard_star(
     let camera = &frame.identification.camera;
     // Where the field of an all-sky lens ends, in units of the distance of the corners.
     let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
-    let measured = Measured::of(frame, star, detection);
+    let measured = MeasuredMagnitude::of(frame, star, detection);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,
         bv_mag: known.bv_mag.map(f64::from),

@@ -39,7 +39,7 @@ pub(super) fn find_bodies(
     if expected.is_empty() {
         return expected;
     }
-    let field = Field::new(found, sources, catalog);
+    let field = IdentifiedSources::new(found, sources, catalog);
     let bodies: Vec<BodyInFrame> = expected
         .into_iter()
         .map(|body| BodyInFrame {
@@ -59,7 +59,7 @@ pub(super) fn find_bodies(
 }
 
 /// What is known of the sources of a frame.
-struct Field<'a> {
+struct IdentifiedSources<'a> {
     found: &'a Identification,
     sources: &'a [Source],
     /// V magnitude of the star that a source was identified as.
@@ -68,7 +68,7 @@ struct Field<'a> {
     zero_point_mag: Option<f64>,
 }
 
-impl<'a> Field<'a> {
+impl<'a> IdentifiedSources<'a> {
     fn new(found: &'a Identification, sources: &'a [Source], catalog: &Catalog) -> Self {
         let v_mag = |star| f64::from(catalog.star(star).v_mag);
         let named = found.matches.iter().map(|m| (m.source, v_mag(m.star)));

@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 
 /// A camera on a mount that does not move.
 #[derive(Debug, Clone)]
-pub struct HeldCamera {
+pub struct FixedCamera {
     /// Its lens.
     pub camera: CameraModel,
     /// How it stands in the sky of its site: apparent directions, in the axes of the horizon, to camera axes.
@@ -35,7 +35,7 @@ pub struct HeldCamera {
 /// How far from where it is held the boresight is searched for first.
 const NEAR_RAD: f64 = RAD_PER_DEG;
 
-impl HeldCamera {
+impl FixedCamera {
     /// The attitude when the stars are at `places`; `None` where site or time are not known.
     pub fn attitude(&self, places: &StarPlaces) -> Option<Rotation<Icrs, Camera>> {
         let horizon = places.horizon()?;

@@ -38,7 +38,7 @@ pub use context::DEFAULT_TIME_LIMIT_S;
 pub use context::{Context, Workspace};
 pub use error::Error;
 pub use error::remedies_of;
-pub use held::HeldCamera;
+pub use held::FixedCamera;
 pub use note::Note;
 pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};

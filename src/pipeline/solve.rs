@@ -6,7 +6,7 @@ use super::error::Error;
 use super::identification::{SecondImages, identify_stars, observation, through_air_or_not};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
-use super::place_time::{PlaceTime, Settled, settle};
+use super::place_time::{ConfirmedPlaceTime, PlaceTime, settle};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::Solution;
@@ -93,7 +93,7 @@ pub fn solve_read(
         frame = frame.as_stored();
     }
     clock.lap(Stage::Read);
-    let input = Input {
+    let input = SolveInput {
         frame: &frame,
         name: Some(name),
         calibration,
@@ -140,7 +140,7 @@ pub fn solve_frame(
     let clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     workspace.frames.forget();
-    let input = Input {
+    let input = SolveInput {
         frame,
         name: None,
         calibration: None,
@@ -169,7 +169,7 @@ pub fn solve_guarded<R, E: From<Error>>(
 }
 
 /// A frame, and what is known of its origin.
-struct Input<'a> {
+struct SolveInput<'a> {
     frame: &'a Frame<'a>,
     name: Option<&'a Path>,
     /// The calibration that was applied.
@@ -183,7 +183,7 @@ struct Input<'a> {
 
 /// The spine: every stage once, in order.
 fn solve(
-    input: Input,
+    input: SolveInput,
     context: &Context,
     workspace: &mut Workspace,
 ) -> Result<Solution, DetectError> {
@@ -376,7 +376,7 @@ impl StarSearch<'_, '_> {
         let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
         let known = (priors, context.utc_offset);
         let sky = (&sources[..], context.indexed.catalog());
-        let Settled {
+        let ConfirmedPlaceTime {
             outcome,
             places,
             priors,

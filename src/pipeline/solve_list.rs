@@ -5,7 +5,7 @@ use super::context::{Context, Workspace};
 use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
 use super::note::Note;
 use super::outcome::Outcome;
-use super::place_time::{Settled, settle};
+use super::place_time::{ConfirmedPlaceTime, settle};
 use super::solution::Solution;
 use super::source::Source;
 use super::stopwatch::{Stage, Stopwatch};
@@ -90,7 +90,7 @@ pub fn solve_centroids(
     };
     let answer = through_air_or_not(priors.places(), &mut identify);
     let known = (priors, context.utc_offset);
-    let Settled {
+    let ConfirmedPlaceTime {
         mut outcome,
         priors,
         place_time,

@@ -22,7 +22,7 @@ use crate::frame::{DefectiveColumn, Frame};
 use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame, PictureColors};
-use crate::sky::{self, DarkLevel, DarkSource, Picture, SkyMap, StatedLimit};
+use crate::sky::{self, DarkLevel, DarkSource, SkyMap, SkyPicture, StatedLimit};
 use std::collections::HashSet;
 
 /// What the stages found in a frame.
@@ -97,7 +97,7 @@ impl SolvedFrame<'_> {
         let by_frame = self.frame.metadata.dark_level_adu.filter(|_| !has_flat);
         let by_frame = by_frame.map(|adu| DarkLevel::stated(adu, DarkSource::OpticalBlack));
         let usual = self.context.held.as_ref();
-        let picture = Picture {
+        let picture = SkyPicture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
             colors,

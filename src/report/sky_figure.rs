@@ -31,7 +31,7 @@ pub fn is_figure(head: &[u8]) -> bool {
 }
 
 /// One picture of the sky.
-struct Panel {
+struct SkyPanel {
     title: &'static str,
     unit: &'static str,
     value: fn(&SkyCellReport) -> Option<f64>,
@@ -42,8 +42,8 @@ struct Panel {
     decimals: usize,
 }
 
-const PANELS: [Panel; 3] = [
-    Panel {
+const PANELS: [SkyPanel; 3] = [
+    SkyPanel {
         title: "Brightness",
         unit: "V magnitude of a square arcsecond",
         value: |cell| cell.mag_arcsec2,
@@ -51,7 +51,7 @@ const PANELS: [Panel; 3] = [
         bounds: None,
         decimals: 1,
     },
-    Panel {
+    SkyPanel {
         title: "Extinction by clouds",
         unit: "magnitudes beyond clear air",
         value: |cell| cell.extinction_mag,
@@ -59,7 +59,7 @@ const PANELS: [Panel; 3] = [
         bounds: Some([0.0, 2.0]),
         decimals: 1,
     },
-    Panel {
+    SkyPanel {
         title: "Limit, measured − expected",
         unit: "magnitudes",
         value: |cell| Some(cell.limit_vmag? - cell.expected_limit_vmag?),
@@ -76,7 +76,7 @@ pub fn svg(report: &FrameReport) -> Option<String> {
         let mut cells = sky.cells.iter();
         cells.any(|cell| (panel.value)(cell).is_some())
     });
-    let shown: Vec<&Panel> = shown.collect();
+    let shown: Vec<&SkyPanel> = shown.collect();
     let width = PANEL * shown.len().max(1) as f64;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {HEIGHT}\" width=\"{width}\" \
@@ -118,7 +118,7 @@ fn title(report: &FrameReport, sky: &SkyReport) -> String {
     parts.join(" · ")
 }
 
-impl Panel {
+impl SkyPanel {
     /// The color of a value from 0 to 1 between the bounds.
     fn color(&self, value: f64) -> String {
         color(if self.is_low_light {

@@ -25,7 +25,7 @@ fn report(solution: &Solution, trail: &Trail) -> TrailReport {
         let flux = trail.flux_adu() / measured.exposure_s.unwrap_or(1.0);
         Some(measured.zero_point.as_ref()?.v_mag + instrumental_mag(flux))
     });
-    let [begin, end] = [trail.begin, trail.end].map(|end| Place::of(solution, &end));
+    let [begin, end] = [trail.begin, trail.end].map(|end| TrailEnd::of(solution, &end));
     let length_rad = begin
         .direction
         .zip(end.direction)
@@ -61,12 +61,12 @@ fn report(solution: &Solution, trail: &Trail) -> TrailReport {
 }
 
 /// Where an end is seen, where that is known.
-struct Place {
+struct TrailEnd {
     direction: Option<UnitVector<Icrs>>,
     observed: Option<Observation>,
 }
 
-impl Place {
+impl TrailEnd {
     fn of(solution: &Solution, pixel: &PixelPoint) -> Self {
         let found = solution.outcome.identification();
         let direction = found.and_then(|found| {

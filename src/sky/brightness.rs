@@ -2,11 +2,11 @@
 //! pixel, on the zero point of the stars of the same frame.
 
 use super::clear_sky::{ClearSky, USUAL_SKY_BV_MAG};
-use super::color::{ColorIndex, SkyColors};
+use super::color::{SkyColorIndex, SkyColors};
 use super::dark_level::DarkLevel;
-use super::grid::Grid;
+use super::grid::SkyCellGrid;
 use super::lens_circle::LensCircle;
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::statistics::{Estimate, median_of};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
@@ -97,12 +97,12 @@ pub(super) struct CellLevel {
     pub limit_adu: f64,
     /// Airmass, where the horizon is known.
     pub airmass: Option<f64>,
-    light: Sum,
+    light: LightSum,
 }
 
 /// Light over solid angle; of a sample, too.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sum {
+struct LightSum {
     /// Number of samples.
     samples: f64,
     /// Their distances from the lens's axis over that of the edge of the field, squared.
@@ -116,7 +116,7 @@ struct Sum {
 }
 
 /// Light and threshold of all cells.
-pub(super) struct Levels {
+pub(super) struct SkyLevels {
     /// Each of them.
     pub cells: Vec<CellLevel>,
     /// Fluxes are over this time.
@@ -124,17 +124,17 @@ pub(super) struct Levels {
     /// Error of the level that was subtracted, in ADU.
     dark_sigma_adu: f64,
     /// How light behind filters tells its color.
-    color_index: Option<ColorIndex>,
+    color_index: Option<SkyColorIndex>,
     /// The light about the zenith, weighted as a meter sees it.
-    zenith: Sum,
+    zenith: LightSum,
     /// Solid angle about the zenith in the frame, weighted in the same way.
     zenith_sr: f64,
     /// Where it was measured.
-    places: Vec<LitPlace>,
+    places: Vec<LightSample>,
 }
 
 /// A place at which light is measured.
-struct LitPlace {
+struct LightSample {
     cell: usize,
     /// How a meter at the zenith weighs it.
     zenith_weight: f64,
@@ -148,8 +148,8 @@ struct LitPlace {
 
 /// Light of cells and about the zenith, in other units than levels.
 pub(super) struct OtherLight {
-    cells: Vec<Sum>,
-    zenith: Sum,
+    cells: Vec<LightSum>,
+    zenith: LightSum,
 }
 
 /// What the sums of a cell need.
@@ -159,13 +159,13 @@ struct CellSums {
     limit_adu: f64,
 }
 
-impl Levels {
+impl SkyLevels {
     /// Measures them on samples of the frame.
     pub(super) fn of(
         frame: &IdentifiedFrame,
-        picture: &Picture,
+        picture: &SkyPicture,
         dark: Option<&DarkLevel>,
-        grid: &Grid,
+        grid: &SkyCellGrid,
         clear_sky: &ClearSky,
         mut colors: Option<SkyColors>,
     ) -> Self {
@@ -182,7 +182,7 @@ impl Levels {
             exposure_s: frame.exposure_s.unwrap_or(1.0),
             dark_sigma_adu: picture.flux_scale * dark.map_or(0.0, |dark| dark.adu.sigma),
             color_index: colors.as_ref().map(|colors| colors.index),
-            zenith: Sum::default(),
+            zenith: LightSum::default(),
             zenith_sr: 0.0,
             places: Vec::new(),
         };
@@ -214,14 +214,14 @@ impl Levels {
                 let weight = frame.places.zenith().map_or(0.0, |zenith| {
                     meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD)
                 });
-                let place = LitPlace {
+                let place = LightSample {
                     cell,
                     zenith_weight: if is_by_moon(&direction) { 0.0 } else { weight },
                     level_adu: f64::from(background_row[x]),
                     off_axis_sq: circle.off_axis_sq(&pixel),
                     pixel_sr: pixel_sr * frame.lens_transmission(&pixel),
                 };
-                let sample = Sum {
+                let sample = LightSum {
                     filters_adu: colors.as_ref().map_or([0.0; 2], |colors| colors.at(x)),
                     ..place.sample(picture.flux_scale * (place.level_adu - dark_adu), clear_sky)
                 };
@@ -239,7 +239,7 @@ impl Levels {
             }
         }
         for (level, sum) in levels.cells.iter_mut().zip(sums) {
-            let Sum { samples, .. } = level.light;
+            let LightSum { samples, .. } = level.light;
             level.limit_adu = sum.limit_adu / samples;
             let airmass = sum.airmass / samples;
             level.airmass = Some(airmass).filter(|airmass| !airmass.is_nan());
@@ -249,7 +249,7 @@ impl Levels {
 
     /// Light of a cell over its solid angle, in ADU per steradian.
     pub(super) fn radiance_adu_sr(&self, cell: usize) -> Option<f64> {
-        let Sum {
+        let LightSum {
             light_adu,
             solid_angle_sr,
             ..
@@ -284,8 +284,8 @@ impl Levels {
     /// The light in other units, of which `light` tells that of a level.
     pub(super) fn in_units(&self, light: impl Fn(f64) -> f64, clear_sky: &ClearSky) -> OtherLight {
         let mut found = OtherLight {
-            cells: vec![Sum::default(); self.cells.len()],
-            zenith: Sum::default(),
+            cells: vec![LightSum::default(); self.cells.len()],
+            zenith: LightSum::default(),
         };
         for place in &self.places {
             let sample = place.sample(light(place.level_adu), clear_sky);
@@ -301,14 +301,14 @@ impl Levels {
         light: &OtherLight,
         clear_sky: &ClearSky,
     ) -> (Vec<Option<SkyLight>>, Option<SkyLight>) {
-        let of = |sum: &Sum| self.brightness(sum, clear_sky, 0.0);
+        let of = |sum: &LightSum| self.brightness(sum, clear_sky, 0.0);
         let zenith = Some(&light.zenith).filter(|_| self.shows_zenith());
         (light.cells.iter().map(of).collect(), zenith.and_then(of))
     }
 
     fn brightness(
         &self,
-        light: &Sum,
+        light: &LightSum,
         clear_sky: &ClearSky,
         dark_sigma_adu: f64,
     ) -> Option<SkyLight> {
@@ -334,10 +334,10 @@ impl Levels {
     }
 }
 
-impl LitPlace {
+impl LightSample {
     /// With this light, and what a clear sky's lens lets through.
-    fn sample(&self, light_adu: f64, clear_sky: &ClearSky) -> Sum {
-        Sum {
+    fn sample(&self, light_adu: f64, clear_sky: &ClearSky) -> LightSum {
+        LightSum {
             samples: 1.0,
             off_axis_sq: self.off_axis_sq,
             light_adu,
@@ -366,7 +366,7 @@ impl CellLevel {
     }
 }
 
-impl Sum {
+impl LightSum {
     fn mean_off_axis_sq(&self) -> f64 {
         self.off_axis_sq / self.samples
     }
@@ -383,7 +383,7 @@ impl Sum {
 }
 
 /// The solid angle of a pixel, in steradians.
-fn solid_angle_sr(grid: &Grid, pixel: &PixelPoint) -> Option<f64> {
+fn solid_angle_sr(grid: &SkyCellGrid, pixel: &PixelPoint) -> Option<f64> {
     let at = |dx: f64, dy: f64| {
         let place = PixelPoint::new(pixel.x + dx, pixel.y + dy);
         Some(*grid.camera().direction_of(&place)?.as_vector())

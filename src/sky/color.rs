@@ -1,7 +1,7 @@
 //! The color of the sky's light: its ratio behind two filters of a color camera, as stars show it.
 
 use super::dark_level::{DarkLevel, DarkSource};
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use super::stars::SkyStar;
 use crate::base::statistics::Estimate;
 use crate::detect::BackgroundMap;
@@ -15,9 +15,9 @@ const MESH_PX: usize = 32;
 
 /// How the light behind two filters tells its color.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ColorIndex(zero_point::ColorIndex);
+pub(super) struct SkyColorIndex(zero_point::ColorIndex);
 
-impl ColorIndex {
+impl SkyColorIndex {
     /// By the colors of stars at the ground.
     fn of(colors: &PictureColors, stars: &[SkyStar], spot_sigma_px: f64) -> Option<Self> {
         /// Stars with a larger error, in magnitudes, tell little.
@@ -62,7 +62,7 @@ fn ratio_mag([first, second]: [f64; 2]) -> Option<f64> {
 /// The sky behind two filters, row by row.
 pub(super) struct SkyColors {
     /// How its light tells its color.
-    pub index: ColorIndex,
+    pub index: SkyColorIndex,
     /// Pixels of the frame for one of theirs, on each axis.
     pixels_of_one: usize,
     filters: [FilteredSky; 2],
@@ -80,13 +80,13 @@ impl SkyColors {
     /// Those of a color picture whose level without light is known.
     pub(super) fn of(
         frame: &IdentifiedFrame,
-        picture: &Picture,
+        picture: &SkyPicture,
         dark: Option<&DarkLevel>,
         stars: &[SkyStar],
     ) -> Option<Self> {
         let dark = dark?;
         let colors = (picture.colors)()?;
-        let index = ColorIndex::of(&colors, stars, frame.detections.spot_sigma_px)?;
+        let index = SkyColorIndex::of(&colors, stars, frame.detections.spot_sigma_px)?;
         let frames = colors.frames()?;
         // A program that balances white may multiply this level, too.
         let is_of_each = dark.source == DarkSource::Unlit && colors.pixels_of_one() == 1;

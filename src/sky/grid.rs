@@ -44,7 +44,7 @@ pub enum Place {
 }
 
 /// The horizon's axes.
-struct Horizon {
+struct HorizonAxes {
     zenith: UnitVector<Icrs>,
     north: UnitVector<Icrs>,
     east: UnitVector<Icrs>,
@@ -69,7 +69,7 @@ pub fn horizon_places() -> Vec<Place> {
 }
 
 /// The parts of the sky over a frame.
-pub(super) struct Grid<'a> {
+pub(super) struct SkyCellGrid<'a> {
     found: &'a Identification,
     /// Each part.
     pub places: Vec<Place>,
@@ -77,22 +77,22 @@ pub(super) struct Grid<'a> {
     centers: Vec<Option<UnitVector<Icrs>>>,
     /// Angle of the breadth of a cell.
     breadth_rad: f64,
-    horizon: Option<Horizon>,
+    horizon: Option<HorizonAxes>,
     /// Rows and columns of a frame's cells.
     size: [usize; 2],
 }
 
-impl<'a> Grid<'a> {
+impl<'a> SkyCellGrid<'a> {
     /// The parts of the sky over `frame`.
     pub(super) fn over(frame: &IdentifiedFrame<'a>) -> Self {
         let found = frame.identification;
-        match Horizon::of(&frame.places).filter(|_| is_wide(&found.camera)) {
+        match HorizonAxes::of(&frame.places).filter(|_| is_wide(&found.camera)) {
             Some(horizon) => Self::of_horizon(found, horizon, &frame.places),
             None => Self::of_frame(found),
         }
     }
 
-    fn of_horizon(found: &'a Identification, horizon: Horizon, places: &StarPlaces) -> Self {
+    fn of_horizon(found: &'a Identification, horizon: HorizonAxes, places: &StarPlaces) -> Self {
         let cells = horizon_places();
         let center = |place: &Place| match place {
             Place::Horizon {
@@ -218,7 +218,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-impl Horizon {
+impl HorizonAxes {
     fn of(places: &StarPlaces) -> Option<Self> {
         Some(Self {
             zenith: places.in_horizon(0.0, FRAC_PI_2)?,

@@ -2,7 +2,7 @@
 //! the centre by the camera's description, or without one that of the clear parts of the frame.
 
 use super::clouds::CellClouds;
-use super::witnesses::{Sky, Witness};
+use super::witnesses::{CellStar, CloudInputs};
 use crate::base::statistics::Estimate;
 use crate::photometry::completeness::{self, CountedStar};
 
@@ -26,7 +26,7 @@ pub struct StatedLimit {
 
 impl StatedLimit {
     /// V magnitude of the limit in the air of a frame, as its stars show it.
-    fn in_air_of(&self, sky: &Sky) -> f64 {
+    fn in_air_of(&self, sky: &CloudInputs) -> f64 {
         sky.center_airmass().map_or(self.v_mag, |airmass| {
             let extinction_mag = sky.clear_sky.extinction_mag.value * airmass;
             self.v_mag + self.extinction_mag - extinction_mag
@@ -36,8 +36,8 @@ impl StatedLimit {
 
 /// The limits of each cell.
 pub(super) fn limits(
-    sky: &Sky,
-    witnesses: &[Witness],
+    sky: &CloudInputs,
+    witnesses: &[CellStar],
     clouds: &[CellClouds],
     stated: Option<&StatedLimit>,
 ) -> Vec<CellLimits> {
@@ -75,8 +75,8 @@ pub(super) fn limits(
 /// not near are those of cells that are `alike`: clear, or behind clouds. Each counts as it would behind the
 /// clouds of the cell. `None` where the sky has too few stars, or clouds hide them, or no star tells of the clouds.
 fn measured_over_depth(
-    sky: &Sky,
-    (witnesses, clouds): (&[Witness], &[CellClouds]),
+    sky: &CloudInputs,
+    (witnesses, clouds): (&[CellStar], &[CellClouds]),
     cell: usize,
     expected: f64,
     alike: impl Fn(usize) -> bool,
@@ -98,7 +98,7 @@ fn measured_over_depth(
             let is_near = sky.grid.is_near(cell, &witness.star.direction, reach);
             is_near && (reach == 1.0 || alike(witness.cell))
         });
-        let moved = |witness: &Witness| {
+        let moved = |witness: &CellStar| {
             let there = clouds[witness.cell].extinction_mag;
             let more_mag = there.map_or(0.0, |there| there.value - here.value);
             witness.counted(witness.relative_mag + more_mag)

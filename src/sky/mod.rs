@@ -46,17 +46,17 @@ pub use dark_level::{DarkLevel, DarkSource};
 pub use grid::Place;
 pub(crate) use grid::{horizon_places, is_wide};
 pub use limits::StatedLimit;
-pub(crate) use picture::Picture;
+pub(crate) use picture::SkyPicture;
 pub use tone_curve::{CurveKind, ToneFit};
 
 use crate::base::statistics::Estimate;
 use crate::identify::{IndexedCatalog, SkyView};
 use crate::photometry::IdentifiedFrame;
 use crate::photometry::association::associate;
-use brightness::Levels;
-use grid::Grid;
+use brightness::SkyLevels;
+use grid::SkyCellGrid;
 use tone_curve::{Curved, CurvedFrame};
-use witnesses::Sky;
+use witnesses::CloudInputs;
 
 /// The sky over a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +112,7 @@ pub struct SkyCell {
 /// frame of the camera, `usual` is the clear sky of that.
 pub(crate) fn measure(
     frame: &IdentifiedFrame,
-    picture: &Picture,
+    picture: &SkyPicture,
     catalog: &IndexedCatalog,
     stated: Option<&StatedLimit>,
     usual: Option<&ClearSky>,
@@ -129,13 +129,13 @@ pub(crate) fn measure(
         Some(usual) => *usual,
         None => ClearSky::of(&stars, picture.is_flat)?,
     };
-    let grid = Grid::over(frame);
+    let grid = SkyCellGrid::over(frame);
     let dark = dark_level(frame, picture);
     let is_proportional = is_proportional(picture, &clear_sky, usual.is_some());
     let color = dark
         .filter(|_| is_proportional)
         .and_then(|dark| color::SkyColors::of(frame, picture, Some(&dark), &stars));
-    let levels = Levels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
+    let levels = SkyLevels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
     let measured = CurvedFrame {
         frame,
         picture,
@@ -153,7 +153,7 @@ pub(crate) fn measure(
     let no_brightness = || NoBrightness::of(dark.as_ref(), &clear_sky);
     let no_brightness = curved.is_none().then(no_brightness);
     let depths = depth::depths(&levels, &clear_sky);
-    let sky = Sky {
+    let sky = CloudInputs {
         grid: &grid,
         stars: &stars,
         clear_sky: &clear_sky,
@@ -165,7 +165,7 @@ pub(crate) fn measure(
         is_usual: usual.is_some(),
     };
     let witnesses = sky.witnesses();
-    let clouds::Clouds {
+    let clouds::CloudMap {
         cells: clouds,
         share,
     } = sky.clouds(&witnesses, &levels);
@@ -198,7 +198,7 @@ pub(crate) fn measure(
 }
 
 /// The level of a pixel without light: stated, of pixels that no light reaches, or of other frames of the camera.
-fn dark_level(frame: &IdentifiedFrame, picture: &Picture) -> Option<DarkLevel> {
+fn dark_level(frame: &IdentifiedFrame, picture: &SkyPicture) -> Option<DarkLevel> {
     // A flat divides unlit pixels by what is no light.
     let unlit = || match picture.is_flat {
         true => None,
@@ -209,7 +209,7 @@ fn dark_level(frame: &IdentifiedFrame, picture: &Picture) -> Option<DarkLevel> {
 
 /// Whether gray levels are taken to be proportional to light: stars show no tone curve, and the file has more than
 /// the eight bits of most that have one, or a level without light is stated for it.
-fn is_proportional(picture: &Picture, clear_sky: &ClearSky, is_usual: bool) -> bool {
+fn is_proportional(picture: &SkyPicture, clear_sky: &ClearSky, is_usual: bool) -> bool {
     let is_raw = picture.dark.is_some() || !picture.has_eight_bits();
     !clear_sky.has_tone_curve() && (is_raw || is_usual)
 }

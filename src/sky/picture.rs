@@ -7,7 +7,7 @@ use crate::frame::Frame;
 use crate::photometry::PictureColors;
 
 /// A frame's pixels, and what is known of their light.
-pub(crate) struct Picture<'a, 'p> {
+pub(crate) struct SkyPicture<'a, 'p> {
     /// The calibrated frame, without a mosaic.
     pub frame: &'a Frame<'a>,
     /// What fluxes were multiplied with: levels are as well.
@@ -26,7 +26,7 @@ pub(crate) struct Picture<'a, 'p> {
     pub moon: Option<UnitVector<Icrs>>,
 }
 
-impl Picture<'_, '_> {
+impl SkyPicture<'_, '_> {
     /// Whether it has eight bits: most files of so few have a tone curve.
     pub(super) fn has_eight_bits(&self) -> bool {
         self.frame.saturation_adu == Some(f32::from(u8::MAX))

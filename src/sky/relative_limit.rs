@@ -1,7 +1,7 @@
 //! The completeness of a clear sky.
 
 use super::clear_sky::ClearSky;
-use super::witnesses::Witness;
+use super::witnesses::CellStar;
 use crate::photometry::completeness::{self, CountedStar, Limit};
 
 /// The magnitude at which half of the stars are detected, over that of the threshold: about 0.
@@ -13,7 +13,7 @@ impl RelativeLimit {
     ///
     /// Clouds hide whole stars, too: a larger share of lost ones than is usual is theirs.
     pub(super) fn of_clear_sky(
-        witnesses: &[Witness],
+        witnesses: &[CellStar],
         clear_sky: &ClearSky,
         chance: f64,
     ) -> Option<Self> {
@@ -21,7 +21,7 @@ impl RelativeLimit {
         const MOST_LOST: f64 = 0.05;
         /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
         const DIMMED_SIGMAS: f64 = 3.0;
-        let is_dimmed = |witness: &&Witness| {
+        let is_dimmed = |witness: &&CellStar| {
             let dimmed_by = clear_sky.dimmed_by(witness.star);
             dimmed_by.is_some_and(|dimmed_by| dimmed_by.value > DIMMED_SIGMAS * dimmed_by.sigma)
         };
@@ -34,7 +34,7 @@ impl RelativeLimit {
             dimmed[witness.cell][0] += 1;
             dimmed[witness.cell][1] += usize::from(is_dimmed(&witness));
         }
-        let is_clear = |witness: &&Witness| {
+        let is_clear = |witness: &&CellStar| {
             let [all, dimmed] = dimmed[witness.cell];
             all > 0 && 4 * dimmed <= all
         };

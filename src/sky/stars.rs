@@ -4,7 +4,7 @@ use super::lens_circle::LensCircle;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::identify::{IndexedCatalog, PredictedStar};
 use crate::photometry::association::Association;
-use crate::photometry::{IdentifiedFrame, Measured};
+use crate::photometry::{IdentifiedFrame, MeasuredMagnitude};
 
 /// A star that the frame should show, alone at its place.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +28,7 @@ pub(super) struct SkyStar {
     /// Where it was detected.
     pub seen_at: Option<PixelPoint>,
     /// Its brightness in the frame, where that is clean.
-    pub measured: Option<Measured>,
+    pub measured: Option<MeasuredMagnitude>,
 }
 
 /// The stars of a frame that are alone at their places.
@@ -53,7 +53,7 @@ pub(super) fn of(
             });
             let measured = clean
                 .filter(|detection| detection.flux_adu > 0.0)
-                .map(|detection| Measured::of(frame, star, detection));
+                .map(|detection| MeasuredMagnitude::of(frame, star, detection));
             let direction = frame.places.of(known);
             SkyStar {
                 direction,

@@ -1,17 +1,17 @@
 //! The stars as witnesses of the sky in which they are.
 
-use super::brightness::Levels;
+use super::brightness::SkyLevels;
 use super::clear_sky::ClearSky;
-use super::grid::Grid;
+use super::grid::SkyCellGrid;
 use super::stars::SkyStar;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::photometry::completeness::CountedStar;
 use crate::photometry::{IdentifiedFrame, instrumental_mag};
 
 /// What is known of the sky before clouds.
-pub(super) struct Sky<'a> {
+pub(super) struct CloudInputs<'a> {
     /// The cells.
-    pub grid: &'a Grid<'a>,
+    pub grid: &'a SkyCellGrid<'a>,
     /// The stars.
     pub stars: &'a [SkyStar],
     /// The air without clouds.
@@ -23,7 +23,7 @@ pub(super) struct Sky<'a> {
     /// Where the Moon is, where the date is known.
     pub moon: Option<UnitVector<Icrs>>,
     /// Light and threshold of the cells.
-    pub levels: &'a Levels,
+    pub levels: &'a SkyLevels,
     /// Probability that a star has a detection by chance.
     pub chance: f64,
     /// Whether the clear sky is that of another frame.
@@ -31,7 +31,7 @@ pub(super) struct Sky<'a> {
 }
 
 /// A star as a witness of clouds.
-pub(super) struct Witness<'a> {
+pub(super) struct CellStar<'a> {
     /// The star.
     pub star: &'a SkyStar,
     /// Its cell.
@@ -40,7 +40,7 @@ pub(super) struct Witness<'a> {
     pub relative_mag: f64,
 }
 
-impl Witness<'_> {
+impl CellStar<'_> {
     /// The star with a magnitude, as one that counts in a completeness.
     pub(super) fn counted(&self, v_mag: f64) -> CountedStar {
         CountedStar {
@@ -50,7 +50,7 @@ impl Witness<'_> {
     }
 }
 
-impl Sky<'_> {
+impl CloudInputs<'_> {
     /// V magnitude of a star in clear air at the frame's centre and at the typical threshold: for these the
     /// limit is predicted. `None` where nothing was searched.
     pub(super) fn typical_depth_vmag(&self) -> Option<f64> {
@@ -66,16 +66,16 @@ impl Sky<'_> {
     }
 
     /// The stars in cells whose depth is known.
-    pub(super) fn witnesses(&self) -> Vec<Witness<'_>> {
+    pub(super) fn witnesses(&self) -> Vec<CellStar<'_>> {
         let witness = |star| self.witness(star);
         self.stars.iter().filter_map(witness).collect()
     }
 
-    fn witness<'s>(&self, star: &'s SkyStar) -> Option<Witness<'s>> {
+    fn witness<'s>(&self, star: &'s SkyStar) -> Option<CellStar<'s>> {
         let cell = self.grid.cell_of(&star.pixel, &star.direction)?;
         let limit_adu = self.frame.flux_limit_adu(&star.pixel)?;
         let limit_mag = instrumental_mag(limit_adu / self.levels.exposure_s);
-        Some(Witness {
+        Some(CellStar {
             star,
             cell,
             relative_mag: -self.clear_sky.dimmer_mag(star, limit_mag) - star.brighter_mag,

@@ -8,7 +8,7 @@
 
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::camera::{CameraModel, DistortionModel};
-use crate::identify::fit::{MeasuredStar, Prediction, Predictor};
+use crate::identify::fit::{MeasuredStar, PositionPredictor, PredictedPosition};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 /// Parameters of the attitude.
@@ -79,7 +79,7 @@ impl LensRefiner {
         self.normal.fill(0.0);
         self.right.fill(0.0);
         let model = self.camera.distortion_model();
-        let predictor = Predictor::new(&self.camera, icrs_to_camera, model);
+        let predictor = PositionPredictor::new(&self.camera, icrs_to_camera, model);
         for star in stars {
             self.add_star(&star, &predictor, excess_px);
         }
@@ -89,11 +89,11 @@ impl LensRefiner {
     }
 
     /// Adds the two equations of a star.
-    fn add_star(&mut self, star: &MeasuredStar, predictor: &Predictor, excess_px: f64) {
+    fn add_star(&mut self, star: &MeasuredStar, predictor: &PositionPredictor, excess_px: f64) {
         let Some(prediction) = predictor.predict(&star.icrs) else {
             return;
         };
-        let Prediction {
+        let PredictedPosition {
             by_pose, observed, ..
         } = &prediction;
         let offset = self.camera.offset_of(&star.pixel);

@@ -58,7 +58,7 @@ pub struct Tracker<'a> {
     guides: Guides,
     pose: PoseFitter,
     agreement: Agreement,
-    buffers: Buffers,
+    buffers: TrackBuffers,
     known: Option<TrackerState>,
 }
 
@@ -99,7 +99,7 @@ struct Clock {
 }
 
 #[derive(Debug, Default)]
-struct Buffers {
+struct TrackBuffers {
     expected: Vec<ExpectedStar>,
     /// The star of each place.
     guides: Vec<GuideStar>,
@@ -120,7 +120,7 @@ impl<'a> Tracker<'a> {
             guides: Guides::default(),
             pose: PoseFitter::default(),
             agreement: Agreement::default(),
-            buffers: Buffers::default(),
+            buffers: TrackBuffers::default(),
             known: None,
         }
     }
@@ -549,7 +549,13 @@ impl PredictedView<'_> {
     }
 
     /// Chooses the brightest stars that are well within the frame.
-    fn choose(&self, guides: &[GuideStar], stars: usize, spot: &SpotModel, buffers: &mut Buffers) {
+    fn choose(
+        &self,
+        guides: &[GuideStar],
+        stars: usize,
+        spot: &SpotModel,
+        buffers: &mut TrackBuffers,
+    ) {
         let icrs_to_camera = &self.prediction.icrs_to_camera;
         let cos_reach = libm::cos(self.camera.radius_rad());
         buffers.expected.clear();
@@ -602,7 +608,7 @@ fn smear_px(
     }
 }
 
-impl Buffers {
+impl TrackBuffers {
     /// Makes stars of what was found, without those whose brightness is not theirs.
     fn take_found(&mut self, zero_point_mag: &mut f64) {
         let Self {

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
-use starpipe::study::robustness::{Protocol, SimulatedCentroids};
+use starpipe::study::robustness::{SimulatedCentroids, TrialProtocol};
 
 fn allocations(work: impl FnOnce()) -> u64 {
     allocation_counter::measure(work).count_total
@@ -14,10 +14,10 @@ fn allocations(work: impl FnOnce()) -> u64 {
 /// Fields of several widths; the last one has no true stars.
 fn fields(sky: &IndexedCatalog) -> Vec<StarField> {
     let draw = |(seed, fov_deg): (u64, f64)| {
-        let protocol = Protocol {
+        let protocol = TrialProtocol {
             fov_deg,
             mean_stars: 60.0,
-            ..Protocol::default()
+            ..TrialProtocol::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut field = SimulatedCentroids::draw(&protocol, sky, &mut random)

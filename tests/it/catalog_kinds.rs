@@ -4,7 +4,7 @@ use crate::common::{Ran, Truth, fixture, gzip, number, shared_dir, starpipe};
 use proptest::prelude::*;
 use starpipe::base::coords::UnitVector;
 use starpipe::base::units::{ARCSEC_PER_RAD, RAD_PER_DEG};
-use starpipe::catalog::{Catalog, Reading, Star, StarFlags, StarId, StarIndex, TychoId};
+use starpipe::catalog::{Catalog, LoadedCatalog, Star, StarFlags, StarId, StarIndex, TychoId};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ impl Folder {
     }
 }
 
-fn read(path: &Path) -> Reading {
+fn read(path: &Path) -> LoadedCatalog {
     starpipe::catalog::read(path).unwrap()
 }
 

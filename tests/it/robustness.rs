@@ -9,9 +9,11 @@ use serde_json::Value;
 use starpipe::catalog::StarIndex;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{Priors, identify};
-use starpipe::study::robustness::{Answer, Mirrored, Protocol, SimulatedCentroids, TrialResult};
+use starpipe::study::robustness::{
+    Answer, Mirrored, SimulatedCentroids, TrialProtocol, TrialResult,
+};
 
-fn draw(protocol: &Protocol, seed: u64) -> SimulatedCentroids {
+fn draw(protocol: &TrialProtocol, seed: u64) -> SimulatedCentroids {
     SimulatedCentroids::draw(protocol, sky(), &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
@@ -29,15 +31,15 @@ fn rows(options: &[&str]) -> Vec<Value> {
 
 #[test]
 fn without_errors_every_centroid_is_where_its_star_is() {
-    let exact = Protocol {
+    let exact = TrialProtocol {
         centroid_sigma_px: 0.0,
         mag_sigma: 0.0,
         missing: 0.0,
         false_stars: 0.0,
-        ..Protocol::default()
+        ..TrialProtocol::default()
     };
     for (seed, mirrored) in [(1, Mirrored::Never), (2, Mirrored::Always)] {
-        let observation = draw(&Protocol { mirrored, ..exact }, seed);
+        let observation = draw(&TrialProtocol { mirrored, ..exact }, seed);
         assert_eq!(observation.true_stars(), observation.list.centroids.len());
         assert_eq!(observation.camera.mirrored, mirrored == Mirrored::Always);
         let matrix = observation.icrs_to_camera.matrix();
@@ -57,10 +59,10 @@ fn without_errors_every_centroid_is_where_its_star_is() {
 
 #[test]
 fn brighter_false_stars_come_before_all_true_ones() {
-    let protocol = Protocol {
+    let protocol = TrialProtocol {
         bright_false_stars: 40,
         false_stars: 0.0,
-        ..Protocol::default()
+        ..TrialProtocol::default()
     };
     let drawn = draw(&protocol, 5);
     let first_true = drawn.stars.iter().position(Option::is_some);
@@ -70,11 +72,11 @@ fn brighter_false_stars_come_before_all_true_ones() {
 
 #[test]
 fn errors_missing_and_false_stars_are_as_requested() {
-    let protocol = Protocol {
+    let protocol = TrialProtocol {
         centroid_sigma_px: 1.5,
         missing: 0.3,
         false_stars: 0.5,
-        ..Protocol::default()
+        ..TrialProtocol::default()
     };
     let (mut kept, mut false_stars, mut squares, mut north) = (0.0, 0.0, 0.0, 0.0);
     const TRIALS: u64 = 300;
@@ -109,7 +111,7 @@ fn errors_missing_and_false_stars_are_as_requested() {
 
 #[test]
 fn a_wrong_pointing_is_a_wrong_answer_and_a_wrong_name_is_counted() {
-    let observation = draw(&Protocol::default(), 3);
+    let observation = draw(&TrialProtocol::default(), 3);
     let field = observation.list.star_field(StarPlaces::default());
     let found = identify(&field, &Priors::default(), sky());
     let result = TrialResult::new(&observation, found.as_ref().ok(), 0.0);

@@ -1,11 +1,11 @@
 //! Dark current and bias: a straight line through level over exposure.
 
 use crate::base::statistics::{Estimate, median};
-use crate::calibration::robust::Moments;
+use crate::calibration::robust::RobustMoments;
 
 /// A fitted value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fitted {
+pub struct FittedValue {
     /// The value.
     pub value: f64,
     /// Its standard error. `None` for a line through two points, which leaves no residuals.
@@ -17,22 +17,22 @@ pub struct Fitted {
 pub struct DarkCurrent {
     /// Mean dark current of all pixels, in ADU per second. Its standard error is from the residuals
     /// of the frames' levels.
-    pub mean_adu_s: Fitted,
+    pub mean_adu_s: FittedValue,
     /// Median dark current of the pixels, in ADU per second.
     pub median_adu_s: f64,
     /// Mean level at exposure 0, in ADU.
-    pub bias_adu: Fitted,
+    pub bias_adu: FittedValue,
     /// Dark current of each pixel, in ADU per second; NaN if it has no value.
     pub of_pixels_adu_s: Vec<f32>,
 }
 
 /// A straight line by least squares.
-struct Line {
-    intercept: Fitted,
-    slope: Fitted,
+struct FittedLine {
+    intercept: FittedValue,
+    slope: FittedValue,
 }
 
-impl Line {
+impl FittedLine {
     /// Fits a line to `points`. `None` if all have the same abscissa.
     fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let n = points.len() as f64;
@@ -50,11 +50,11 @@ impl Line {
             .map(|p| (p.1 - intercept - slope * p.0).powi(2));
         let variance = (points.len() > 2).then(|| residuals.sum::<f64>() / (n - 2.0));
         Some(Self {
-            intercept: Fitted {
+            intercept: FittedValue {
                 value: intercept,
                 sigma: variance.map(|v| (v * (1.0 / n + mean_x * mean_x / sum_xx)).sqrt()),
             },
-            slope: Fitted {
+            slope: FittedValue {
                 value: slope,
                 sigma: variance.map(|v| (v / sum_xx).sqrt()),
             },
@@ -67,7 +67,7 @@ impl DarkCurrent {
     /// exposure, number of frames and pixel means of each exposure. `None` if there is only one
     /// exposure.
     pub(super) fn fit(frames: &[(f64, f64)], groups: &[(f64, usize, &[f32])]) -> Option<Self> {
-        let line = Line::fit(frames)?;
+        let line = FittedLine::fit(frames)?;
         let all: f64 = groups.iter().map(|g| g.1 as f64).sum();
         let mean_s = groups.iter().map(|g| g.0 * g.1 as f64).sum::<f64>() / all;
         let sum_tt: f64 = groups
@@ -102,7 +102,7 @@ impl DarkCurrent {
     /// The median dark current with its standard error: that of the mean and that of a median.
     pub fn median(&self) -> Option<Estimate> {
         let valid = self.of_pixels_adu_s.iter().filter(|v| !v.is_nan());
-        let of_pixels = Moments::clipped(&self.of_pixels_adu_s, 0.0)?;
+        let of_pixels = RobustMoments::clipped(&self.of_pixels_adu_s, 0.0)?;
         let of_median =
             std::f64::consts::FRAC_PI_2.sqrt() * of_pixels.sigma / (valid.count() as f64).sqrt();
         Some(Estimate {
@@ -121,7 +121,7 @@ mod tests {
         // Bevington's formulas by hand: x̄ 2, ȳ 5, Σ(x−x̄)² 2, slope 2, intercept 1, residuals
         // ⅓(−1, 2, −1).
         let third = 1.0 / 3.0;
-        let line = Line::fit(&[
+        let line = FittedLine::fit(&[
             (1.0, 3.0 - third),
             (2.0, 5.0 + 2.0 * third),
             (3.0, 7.0 - third),
@@ -136,9 +136,9 @@ mod tests {
         assert!(
             (line.intercept.sigma.unwrap() - f64::sqrt(variance * (1.0 / 3.0 + 2.0))).abs() < 1e-12
         );
-        assert!(Line::fit(&[(1.0, 1.0), (1.0, 2.0)]).is_none());
+        assert!(FittedLine::fit(&[(1.0, 1.0), (1.0, 2.0)]).is_none());
         assert!(
-            Line::fit(&[(1.0, 1.0), (2.0, 2.0)])
+            FittedLine::fit(&[(1.0, 1.0), (2.0, 2.0)])
                 .unwrap()
                 .slope
                 .sigma

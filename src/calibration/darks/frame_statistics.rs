@@ -1,6 +1,6 @@
 //! Statistics of a single dark frame.
 
-use crate::calibration::robust::Moments;
+use crate::calibration::robust::RobustMoments;
 use crate::frame::Frame;
 
 /// Statistics of one dark frame.
@@ -35,7 +35,7 @@ impl FrameStatistics {
     pub fn of(name: &str, frame: &Frame, exposure_s: Option<f64>) -> Self {
         let pixels = frame.values();
         let values = pixels.iter().filter(|p| !p.is_nan());
-        let moments = Moments::of(values.clone().map(|&p| f64::from(p)));
+        let moments = RobustMoments::of(values.clone().map(|&p| f64::from(p)));
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
         let maxima = Maxima::of(frame);
         Self {
@@ -84,7 +84,7 @@ impl Maxima {
         let mut maxima = Self::default();
         let floor = f64::from(frame.step_adu) / 2.0;
         let pixels = frame.values();
-        let Some(moments) = Moments::clipped(&pixels, floor) else {
+        let Some(moments) = RobustMoments::clipped(&pixels, floor) else {
             return maxima;
         };
         let sigma = moments.sigma.max(floor);

@@ -1,8 +1,8 @@
 //! Hot pixels: outliers of level, dark current or noise.
 
 use super::current::DarkCurrent;
-use super::noise::PixelNoise;
-use crate::calibration::robust::{Moments, variance_deviate};
+use super::noise::TemporalNoise;
+use crate::calibration::robust::{RobustMoments, variance_deviate};
 
 /// Default threshold of hot pixels, in standard deviations.
 ///
@@ -46,7 +46,7 @@ pub(super) struct PixelData<'a> {
     pub width: usize,
     /// Mean levels at the longest exposure.
     pub levels: &'a [f32],
-    pub noise: Option<&'a PixelNoise>,
+    pub noise: Option<&'a TemporalNoise>,
     pub dark_current: Option<&'a DarkCurrent>,
     /// Step between grey levels. Half of it is the smallest sigma of levels.
     pub step_adu: f64,
@@ -58,13 +58,13 @@ impl PixelData<'_> {
     /// The pixels that deviate by more than `hot_sigma` standard deviations, row by row.
     pub(super) fn hot_pixels(&self, hot_sigma: f64) -> Vec<HotPixel> {
         let floor = self.step_adu / 2.0;
-        let Some(level) = Moments::clipped(self.levels, floor) else {
+        let Some(level) = RobustMoments::clipped(self.levels, floor) else {
             return Vec::new();
         };
         let currents = self.dark_current.map(|c| c.of_pixels_adu_s.as_slice());
         let current_floor = floor / self.longest_s.unwrap_or(1.0);
-        let current = currents.and_then(|currents| Moments::clipped(currents, current_floor));
-        let is_outlier = |value: f64, moments: &Moments, floor: f64| {
+        let current = currents.and_then(|currents| RobustMoments::clipped(currents, current_floor));
+        let is_outlier = |value: f64, moments: &RobustMoments, floor: f64| {
             (value - moments.mean).abs() > hot_sigma * moments.sigma.max(floor)
         };
         let judge = |(i, &mean): (usize, &f32)| {

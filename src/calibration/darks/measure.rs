@@ -4,7 +4,7 @@ use super::current::DarkCurrent;
 use super::error::DarksError;
 use super::frame_statistics::FrameStatistics;
 use super::hot::{HOT_SIGMA, HotPixel, PixelData};
-use super::noise::{ExposureGroup, PixelNoise, read_noise_adu};
+use super::noise::{ExposureGroup, TemporalNoise, read_noise_adu};
 use super::not_dark::{self, NotDark};
 use super::pattern::Pattern;
 use super::stack::DarkStack;
@@ -63,7 +63,7 @@ pub struct FullScale {
 
 /// A quantity that could not be measured.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Missing {
+pub struct MissingQuantity {
     /// Name of the quantity.
     pub what: &'static str,
     /// Reason.
@@ -105,7 +105,7 @@ pub struct Darks {
     /// Standard deviation of every pixel from frame to frame, in ADU; NaN if it has too few values.
     pub noise_adu: Option<Vec<f32>>,
     /// Quantities that could not be measured.
-    pub missing: Vec<Missing>,
+    pub missing: Vec<MissingQuantity>,
     /// Frames that do not look like dark frames.
     pub warnings: Vec<NotDark>,
 }
@@ -124,7 +124,7 @@ impl DarkStack {
         self.exposures
             .sort_by(|a, b| seconds(a.exposure_s).total_cmp(&seconds(b.exposure_s)));
         let step_adu = f64::from(self.step_adu.unwrap_or(0.0));
-        let noise = PixelNoise::pooled(self.exposures.iter(), width * height);
+        let noise = TemporalNoise::pooled(self.exposures.iter(), width * height);
         let groups: Vec<_> = self
             .exposures
             .iter()
@@ -235,9 +235,9 @@ fn missing(
     dark_current: Option<&DarkCurrent>,
     full_scale: Option<FullScale>,
     config: &DarkConfig,
-) -> Vec<Missing> {
+) -> Vec<MissingQuantity> {
     let mut missing = Vec::new();
-    let mut add = |what, reason: String| missing.push(Missing { what, reason });
+    let mut add = |what, reason: String| missing.push(MissingQuantity { what, reason });
     if groups.iter().all(|group| group.frames < 2) {
         let reason = "no two frames of one exposure: noise and pattern cannot be separated";
         for what in [

@@ -37,15 +37,15 @@ mod report;
 mod stack;
 mod text;
 
-pub use current::{DarkCurrent, Fitted};
+pub use current::{DarkCurrent, FittedValue};
 pub use error::{DarksError, MAX_EXPOSURES};
 pub use frame_statistics::FrameStatistics;
 pub use hot::{HOT_SIGMA, HotPixel, HotReasons};
-pub use measure::{DarkConfig, Darks, FullScale, FullScaleSource, Missing};
+pub use measure::{DarkConfig, Darks, FullScale, FullScaleSource, MissingQuantity};
 pub use noise::ExposureGroup;
 pub use not_dark::{NotDark, NotDarkReason};
 pub use pattern::Pattern;
-pub use report::{DarksReport, FrameRow, HotPixelRow, HotPixelsReport};
+pub use report::{DarkFrameRow, DarksReport, HotPixelRow, HotPixelsReport};
 pub use stack::DarkStack;
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::current::DarkCurrent;
 use super::frame_statistics::is_same_exposure;
 use super::stack::{DarkStack, ExposureStack};
 use crate::calibration::pixel_stack::pooled_variances;
-use crate::calibration::robust::{Moments, typical_variance};
+use crate::calibration::robust::{RobustMoments, typical_variance};
 
 /// The frames of one exposure.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,8 +39,8 @@ impl ExposureGroup {
             .filter(|frame| is_same_exposure(frame.exposure_s, exposure_s));
         let frame_means = of_exposure.map(|frame| frame.mean_adu);
         let (count, means) = (exposure.pixels.frames(), exposure.pixels.means());
-        let frame_to_frame_adu = (count > 1).then(|| Moments::of(frame_means.clone()).sigma);
-        let variance = PixelNoise::pooled([exposure].into_iter(), means.len());
+        let frame_to_frame_adu = (count > 1).then(|| RobustMoments::of(frame_means.clone()).sigma);
+        let variance = TemporalNoise::pooled([exposure].into_iter(), means.len());
         // The variance of the whole frame's level is part of every pixel's variance.
         let pixel_variance = variance
             .zip(frame_to_frame_adu)
@@ -59,7 +59,7 @@ impl ExposureGroup {
 }
 
 /// Variance of every pixel from frame to frame.
-pub(super) struct PixelNoise {
+pub(super) struct TemporalNoise {
     /// In ADU²; NaN if the pixel has too few values.
     pub variances: Vec<f32>,
     /// The variance of a typical pixel, in ADU².
@@ -68,7 +68,7 @@ pub(super) struct PixelNoise {
     pub freedom: f64,
 }
 
-impl PixelNoise {
+impl TemporalNoise {
     /// Pools the variances of `pixels` pixels over the exposures. `None` if no exposure has two
     /// frames.
     pub(super) fn pooled<'a>(
@@ -103,7 +103,7 @@ pub(super) fn read_noise_adu(
         .find(|group| group.temporal_noise_adu.is_some())?;
     let variance = shortest.temporal_noise_adu?.powi(2);
     // The mean current of the same pixels over which the variance is averaged.
-    let current = current.and_then(|current| Moments::clipped(&current.of_pixels_adu_s, 0.0));
+    let current = current.and_then(|current| RobustMoments::clipped(&current.of_pixels_adu_s, 0.0));
     let shot_variance = match (current, gain_e_per_adu, shortest.exposure_s) {
         (Some(current), Some(gain), Some(exposure_s)) => current.mean.max(0.0) * exposure_s / gain,
         _ => 0.0,

@@ -1,6 +1,6 @@
 //! Fixed pattern: the variation of the pixels' means over the detector, its columns and its rows.
 
-use crate::calibration::robust::Moments;
+use crate::calibration::robust::RobustMoments;
 
 /// Standard deviations of the pixels' means, in ADU, without outliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ impl Pattern {
         step: f64,
     ) -> Option<Self> {
         let floor = step / 2.0;
-        let moments = Moments::clipped(means, floor)?;
+        let moments = RobustMoments::clipped(means, floor)?;
         let height = means.len() / width;
         let mut columns = vec![(0.0, 0_u32); width];
         let mut rows = vec![(0.0, 0_u32); height];
@@ -51,7 +51,7 @@ impl Pattern {
         }
         let variance = |lines: &[(f64, u32)]| {
             let known = lines.iter().filter(|(_, count)| *count > 0);
-            let sigma = Moments::of(known.map(|(sum, count)| sum / f64::from(*count))).sigma;
+            let sigma = RobustMoments::of(known.map(|(sum, count)| sum / f64::from(*count))).sigma;
             sigma * sigma
         };
         let (of_columns, of_rows) = (variance(&columns), variance(&rows));

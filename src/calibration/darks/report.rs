@@ -1,8 +1,8 @@
 //! Report on dark frames: values with the units in their names, for JSON and CSV.
 
-use super::current::Fitted;
+use super::current::FittedValue;
 use super::hot::HotPixel;
-use super::measure::{Darks, Missing};
+use super::measure::{Darks, MissingQuantity};
 use super::noise::ExposureGroup;
 use super::not_dark::NotDark;
 use crate::base::format::to_significant;
@@ -47,7 +47,7 @@ pub struct DarksReport {
     /// Hot pixels.
     pub hot_pixels: HotPixelsReport,
     /// Each frame.
-    pub per_frame: Vec<FrameRow>,
+    pub per_frame: Vec<DarkFrameRow>,
     /// Unknown quantities and the reasons.
     pub missing: BTreeMap<&'static str, String>,
     /// Frames that do not look dark.
@@ -136,7 +136,7 @@ pub struct HotPixelsReport {
 
 /// One frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FrameRow {
+pub struct DarkFrameRow {
     /// Name of the frame.
     pub frame: String,
     /// Exposure.
@@ -248,7 +248,7 @@ impl Darks {
             missing: self
                 .missing
                 .iter()
-                .map(|Missing { what, reason }| (*what, reason.clone()))
+                .map(|MissingQuantity { what, reason }| (*what, reason.clone()))
                 .collect(),
             warnings: self.warnings.iter().map(NotDark::to_string).collect(),
         }
@@ -289,7 +289,7 @@ impl Darks {
     ) -> Option<DarkCurrentReport> {
         let current = self.dark_current.as_ref()?;
         let median_sigma = current.median().map(|median| median.sigma);
-        let Fitted {
+        let FittedValue {
             value: mean,
             sigma: mean_sigma,
         } = current.mean_adu_s;
@@ -321,9 +321,9 @@ impl Darks {
     }
 
     /// One row per frame.
-    pub fn frame_rows(&self) -> impl Iterator<Item = FrameRow> {
+    pub fn frame_rows(&self) -> impl Iterator<Item = DarkFrameRow> {
         let full = self.full_scale.map(|full| full.levels_adu);
-        self.frames.iter().map(move |frame| FrameRow {
+        self.frames.iter().map(move |frame| DarkFrameRow {
             frame: frame.frame.clone(),
             exposure_s: frame.exposure_s,
             mean_adu: rounded(frame.mean_adu),

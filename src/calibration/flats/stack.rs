@@ -4,7 +4,7 @@ use super::error::{FlatsError, MAX_SATURATED_SHARE};
 use super::transfer::{Gain, PairPoint};
 use crate::base::size::Size;
 use crate::calibration::pixel_stack::{PixelStack, pooled_variances};
-use crate::calibration::robust::{Moments, typical_variance};
+use crate::calibration::robust::{RobustMoments, typical_variance};
 use crate::frame::Frame;
 
 /// What is known of the detector.
@@ -87,7 +87,7 @@ impl FlatStack {
         let saturated = saturated_pixels(name, frame)?;
         let above = self.above_dark(frame);
         let valid = above.iter().filter(|p| !p.is_nan());
-        let level_adu = Moments::of(valid.map(|&p| f64::from(p))).mean;
+        let level_adu = RobustMoments::of(valid.map(|&p| f64::from(p))).mean;
         if level_adu <= 0.0 {
             return Err(FlatsError::NoLight {
                 frame: name.to_owned(),
@@ -172,9 +172,9 @@ impl FlatStack {
         let Size { width, height } = self.size;
         let mut master = stack.means();
         let valid = master.iter().filter(|p| !p.is_nan());
-        let mean = Moments::of(valid.map(|&p| f64::from(p))).mean;
+        let mean = RobustMoments::of(valid.map(|&p| f64::from(p))).mean;
         master.iter_mut().for_each(|p| *p /= mean as f32);
-        let moments = Moments::clipped(&master, 0.0).ok_or(FlatsError::NoFrames)?;
+        let moments = RobustMoments::clipped(&master, 0.0).ok_or(FlatsError::NoFrames)?;
         Ok(Flats {
             width,
             height,
@@ -215,7 +215,7 @@ fn pixel_nonuniformity(master: &[f32], width: usize, stack: &PixelStack) -> Opti
         .chunks(width)
         .flat_map(|row| row.windows(2).map(|pair| pair[1] - pair[0]))
         .collect();
-    let sigma = Moments::clipped(&differences, 0.0)?.sigma;
+    let sigma = RobustMoments::clipped(&differences, 0.0)?.sigma;
     // The difference of two pixels has twice the variance of one.
     Some((sigma * sigma / 2.0 - noise / count as f64).max(0.0).sqrt())
 }

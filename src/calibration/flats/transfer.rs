@@ -1,7 +1,7 @@
 //! Photon transfer: the gain from the shot noise of light.
 
 use crate::base::least_squares::LinearFit;
-use crate::calibration::robust::Moments;
+use crate::calibration::robust::RobustMoments;
 use nalgebra::Vector2;
 
 /// Signal and variance of two frames of the same light.
@@ -29,7 +29,7 @@ impl PairPoint {
         );
         let differences: Vec<f32> = one.iter().zip(other).map(|(p, q)| p * a - q * b).collect();
         let count = differences.iter().filter(|d| !d.is_nan()).count();
-        let sigma = Moments::clipped(&differences, step_adu / 2.0)?.sigma;
+        let sigma = RobustMoments::clipped(&differences, step_adu / 2.0)?.sigma;
         let variance = sigma * sigma / 2.0;
         Some(Self {
             signal_adu,

@@ -2,7 +2,7 @@
 
 use super::error::{DataSheetError, line_of};
 use super::imperfections::{Imperfections, SpotForm};
-use super::key::{Key, Limits, nearest_name};
+use super::key::{Key, NumberRange, nearest_name};
 use super::keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 use super::lens_table;
 use super::response::Response;
@@ -387,7 +387,7 @@ impl<'a> SheetFile<'a> {
                 Response::parse(self.path, text.as_bytes()).map_err(table)
             }
             other => as_number(other)
-                .filter(|number| Limits::Share.accept(*number))
+                .filter(|number| NumberRange::Share.accept(*number))
                 .map(Response::Constant)
                 .ok_or_else(|| {
                     let expected = "a number above 0 and at most 1, or the name of a CSV file";

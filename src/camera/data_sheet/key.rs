@@ -4,7 +4,7 @@ use std::fmt;
 
 /// Range of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Limits {
+pub enum NumberRange {
     /// Above 0.
     Positive,
     /// 0 or above.
@@ -21,7 +21,7 @@ pub enum Limits {
     Finite,
 }
 
-impl Limits {
+impl NumberRange {
     /// Whether `value` is within the range.
     pub fn accept(self, value: f64) -> bool {
         value.is_finite()
@@ -37,7 +37,7 @@ impl Limits {
     }
 }
 
-impl fmt::Display for Limits {
+impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Positive => write!(f, "a number above 0"),
@@ -58,7 +58,7 @@ pub struct Key<T> {
     /// Description in one line.
     pub about: &'static str,
     /// Range of the values.
-    pub limits: Limits,
+    pub limits: NumberRange,
     /// Returns the value, if there is one.
     pub get: fn(&T) -> Option<f64>,
     /// Sets the value, which must be within the limits.
@@ -128,10 +128,13 @@ mod tests {
 
     #[test]
     fn implausible_values_are_outside_the_limits() {
-        assert!(!Limits::Positive.accept(0.0) && !Limits::Positive.accept(f64::NAN));
-        assert!(Limits::NotNegative.accept(0.0) && !Limits::NotNegative.accept(-1.0));
-        assert!(Limits::Share.accept(1.0) && !Limits::Share.accept(1.1));
-        assert!(Limits::Whole(1.0, 32.0).accept(12.0) && !Limits::Whole(1.0, 32.0).accept(12.5));
-        assert!(!Limits::FromToBelow(0.0, 90.0).accept(90.0));
+        assert!(!NumberRange::Positive.accept(0.0) && !NumberRange::Positive.accept(f64::NAN));
+        assert!(NumberRange::NotNegative.accept(0.0) && !NumberRange::NotNegative.accept(-1.0));
+        assert!(NumberRange::Share.accept(1.0) && !NumberRange::Share.accept(1.1));
+        assert!(
+            NumberRange::Whole(1.0, 32.0).accept(12.0)
+                && !NumberRange::Whole(1.0, 32.0).accept(12.5)
+        );
+        assert!(!NumberRange::FromToBelow(0.0, 90.0).accept(90.0));
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers of a data sheet by name: one table for the file, the options and the sweeps.
 
-use super::key::{Key, Limits, key};
+use super::key::{Key, NumberRange, key};
 use super::sheet::DataSheet;
 
 /// Whether the number called `name` may be a curve over wavelength. Its value is then the peak.
@@ -9,11 +9,11 @@ pub fn is_curve(name: &str) -> bool {
 }
 
 /// Width and height of a detector, in pixels.
-const SIDES_PX: Limits = Limits::Whole(3.0, 100_000.0);
+const SIDES_PX: NumberRange = NumberRange::Whole(3.0, 100_000.0);
 /// Standard deviation of a star's spot, in pixels.
-const SPOTS_PX: Limits = Limits::FromToBelow(0.05, 20.0);
+const SPOTS_PX: NumberRange = NumberRange::FromToBelow(0.05, 20.0);
 /// Wavelengths that a detector may be sensitive to, in nm.
-const WAVELENGTHS_NM: Limits = Limits::FromToBelow(100.0, 10_000.0);
+const WAVELENGTHS_NM: NumberRange = NumberRange::FromToBelow(100.0, 10_000.0);
 
 /// The numbers of a camera.
 ///
@@ -25,35 +25,35 @@ pub const KEYS: &[Key<DataSheet>] = &[
     key!(height_px, SIDES_PX, "rows of the detector"),
     key!(
         pitch_x_um,
-        Limits::Positive,
+        NumberRange::Positive,
         "pixel pitch along a row, in µm"
     ),
     key!(
         pitch_y_um,
-        Limits::Positive,
+        NumberRange::Positive,
         "pixel pitch along a column, in µm"
     ),
     key!(
         focal_length_mm,
-        Limits::Positive,
+        NumberRange::Positive,
         "focal length of the lens, in mm"
     ),
     key!(
         aperture_mm,
-        Limits::Positive,
+        NumberRange::Positive,
         "diameter of the entrance pupil, in mm"
     ),
     Key {
         name: "lens_transmission",
         about: "transmission of the lens (peak, if it is a curve)",
-        limits: Limits::Share,
+        limits: NumberRange::Share,
         get: |sheet| Some(sheet.lens_transmission.peak()),
         set: |sheet, peak| sheet.lens_transmission = sheet.lens_transmission.with_peak(peak),
     },
     Key {
         name: "quantum_efficiency",
         about: "electrons per photon on a pixel (peak, if it is a curve)",
-        limits: Limits::Share,
+        limits: NumberRange::Share,
         get: |sheet| Some(sheet.quantum_efficiency.peak()),
         set: |sheet, peak| sheet.quantum_efficiency = sheet.quantum_efficiency.with_peak(peak),
     },
@@ -69,28 +69,28 @@ pub const KEYS: &[Key<DataSheet>] = &[
     ),
     key!(
         read_noise_e,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "read noise of a pixel, in electrons"
     ),
     key!(
         dark_current_e_s,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "dark current of a pixel, in electrons per second"
     ),
     key!(
         full_well_e,
-        Limits::Positive,
+        NumberRange::Positive,
         "full well of a pixel, in electrons"
     ),
     key!(
         gain_e_per_adu,
-        Limits::Positive,
+        NumberRange::Positive,
         "gain, in electrons per grey level"
     ),
-    key!(bits, Limits::Whole(1.0, 32.0), "bits of a grey level"),
+    key!(bits, NumberRange::Whole(1.0, 32.0), "bits of a grey level"),
     key!(
         bias_adu,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "bias: grey level without light"
     ),
     Key {
@@ -107,26 +107,26 @@ pub const KEYS: &[Key<DataSheet>] = &[
     Key {
         name: "peak_share",
         about: "share of a star's light on its brightest pixel (default: from spot_sigma_px)",
-        limits: Limits::Share,
+        limits: NumberRange::Share,
         get: |sheet| Some(sheet.peak_share()),
         set: |sheet, share| sheet.peak_share = Some(share),
     },
 ];
 
 /// A share, 0 and 1 included.
-const SHARE: Limits = Limits::FromTo(0.0, 1.0);
+const SHARE: NumberRange = NumberRange::FromTo(0.0, 1.0);
 /// Displacement by the lens, in pixels.
-const DISPLACEMENT_PX: Limits = Limits::FromTo(-1000.0, 1000.0);
+const DISPLACEMENT_PX: NumberRange = NumberRange::FromTo(-1000.0, 1000.0);
 /// Distance of the axis from the frame's centre, in pixels.
-const AXIS_PX: Limits = Limits::FromTo(-20_000.0, 20_000.0);
+const AXIS_PX: NumberRange = NumberRange::FromTo(-20_000.0, 20_000.0);
 /// Length of a spot by aberrations, in pixels.
-const ABERRATION_PX: Limits = Limits::FromTo(-50.0, 50.0);
+const ABERRATION_PX: NumberRange = NumberRange::FromTo(-50.0, 50.0);
 
 /// The numbers of the imperfections, all of them optional.
 pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(vignetting in imperfections, SHARE, "share of the light lost in the corners"),
     key!(field_radius_deg in imperfections,
-        Limits::FromTo(1.0, 110.0),
+        NumberRange::FromTo(1.0, 110.0),
         "angle from the axis up to which a lens that is no pinhole images the sky, in degrees"
     ),
     key!(distortion_px in imperfections,
@@ -160,11 +160,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "larger scale along one diagonal: displacement at the distance of the corner, in pixels"
     ),
     key!(spot_axis_ratio in imperfections,
-        Limits::FromTo(1.0, 10.0),
+        NumberRange::FromTo(1.0, 10.0),
         "longer over shorter axis of a star's spot; their product stays that of a round one"
     ),
     key!(spot_angle_deg in imperfections,
-        Limits::FromTo(-180.0, 180.0),
+        NumberRange::FromTo(-180.0, 180.0),
         "direction of the longer axis, from x towards y, in degrees"
     ),
     key!(coma_px in imperfections,
@@ -180,27 +180,27 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "curvature of the field: radius of the disc of a star in the corner, in pixels"
     ),
     key!(moffat_beta in imperfections,
-        Limits::FromTo(1.2, 100.0),
+        NumberRange::FromTo(1.2, 100.0),
         "exponent of a spot of Moffat's profile"
     ),
     key!(obstruction in imperfections,
-        Limits::FromTo(0.0, 0.95),
+        NumberRange::FromTo(0.0, 0.95),
         "diameter of the central obstruction over that of the pupil, for spots of Airy's pattern"
     ),
     key!(spot_step_px in imperfections,
-        Limits::FromTo(0.01, 5.0),
+        NumberRange::FromTo(0.01, 5.0),
         "distance of the samples of a spot from a file, in pixels"
     ),
     key!(jpeg_quality in imperfections,
-        Limits::FromTo(0.0, 100.0),
+        NumberRange::FromTo(0.0, 100.0),
         "quality of the JPEG of a color camera: mosaic, demosaicing, eight bits; 0: no JPEG"
     ),
     key!(tone_gamma in imperfections,
-        Limits::FromTo(1.0, 5.0),
+        NumberRange::FromTo(1.0, 5.0),
         "exponent of the tone curve of that JPEG"
     ),
     key!(denoise_px in imperfections,
-        Limits::FromTo(0.0, 5.0),
+        NumberRange::FromTo(0.0, 5.0),
         "standard deviation of the smoothing before that JPEG, in pixels"
     ),
     key!(response_sigma in imperfections,
@@ -208,27 +208,27 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "standard deviation of the pixels' response, relative to its mean (PRNU)"
     ),
     key!(dark_current_sigma in imperfections,
-        Limits::FromTo(0.0, 10.0),
+        NumberRange::FromTo(0.0, 10.0),
         "standard deviation of the pixels' dark current, relative to its mean (DSNU)"
     ),
     key!(hot_pixels_per_mpx in imperfections,
-        Limits::FromTo(0.0, 1e6),
+        NumberRange::FromTo(0.0, 1e6),
         "hot pixels per million pixels"
     ),
     key!(hot_pixel_e_s in imperfections,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "mean dark current of a hot pixel, in electrons per second"
     ),
     key!(dead_pixels_per_mpx in imperfections,
-        Limits::FromTo(0.0, 1e6),
+        NumberRange::FromTo(0.0, 1e6),
         "dead pixels per million pixels"
     ),
     key!(offset_sigma_adu in imperfections,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "standard deviation of the pixels' bias, in grey levels"
     ),
     key!(column_sigma_adu in imperfections,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "standard deviation of the columns' bias, in grey levels"
     ),
     key!(blooming in imperfections,
@@ -236,11 +236,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "share of the charge above full well that flows along the column"
     ),
     key!(depth_um in imperfections,
-        Limits::FromTo(0.1, 1000.0),
+        NumberRange::FromTo(0.1, 1000.0),
         "depth of the layer that collects charge, in µm (for cosmic rays)"
     ),
     key!(pattern_seed in imperfections,
-        Limits::Whole(0.0, 9_007_199_254_740_991.0),
+        NumberRange::Whole(0.0, 9_007_199_254_740_991.0),
         "seed of the pixel pattern, which is the same in every frame"
     ),
 ];

@@ -29,7 +29,7 @@ pub use file::CameraDescription;
 pub use imperfections::lens_transmission;
 pub use imperfections::{Imperfections, SpotForm};
 pub(crate) use key::key;
-pub use key::{Key, Limits, nearest_name};
+pub use key::{Key, NumberRange, nearest_name};
 pub use keys::{IMPERFECTION_KEYS, KEYS, is_curve};
 pub use preset::Preset;
 pub use response::Response;

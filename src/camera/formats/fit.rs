@@ -13,19 +13,19 @@ pub(super) const CHECK_POINTS: usize = 49;
 
 /// A direction and the pixel on which it is imaged.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
+pub(super) struct LensSample {
     /// In the axes of the lens: z along its axis.
     pub direction: Vector3<f64>,
     pub pixel: [f64; 2],
 }
 
 /// What the camera sees at `points` × `points` places of the frame, its borders among them.
-pub(super) fn samples(camera: &CameraModel, points: usize) -> Vec<Sample> {
+pub(super) fn samples(camera: &CameraModel, points: usize) -> Vec<LensSample> {
     let to_lens = camera.lens_axes();
     grid(camera.width_px, camera.height_px, points)
         .filter_map(|pixel| {
             let direction = camera.direction_of(&PixelPoint::new(pixel[0], pixel[1]))?;
-            Some(Sample {
+            Some(LensSample {
                 direction: to_lens * direction.as_vector(),
                 pixel,
             })
@@ -51,10 +51,10 @@ pub(super) fn grid(width_px: f64, height_px: f64, points: usize) -> impl Iterato
 /// The largest distance in pixels between `samples` and what `image` makes of their directions;
 /// infinite where it makes nothing.
 pub(super) fn largest_error_px(
-    samples: &[Sample],
+    samples: &[LensSample],
     image: impl Fn(&Vector3<f64>) -> Option<[f64; 2]>,
 ) -> f64 {
-    let error = |sample: &Sample| {
+    let error = |sample: &LensSample| {
         image(&sample.direction).map_or(f64::INFINITY, |[x, y]| {
             libm::hypot(x - sample.pixel[0], y - sample.pixel[1])
         })
@@ -64,7 +64,7 @@ pub(super) fn largest_error_px(
 
 /// A lens to be fitted: its kind, and its first guess.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Guess {
+pub(super) struct LensGuess {
     /// Width, height, whether it is mirrored, focal length, and the angle to which it is valid.
     pub camera: CameraModel,
     /// The axis, as an offset from the frame's centre along the camera's axes.
@@ -76,8 +76,8 @@ pub(super) struct Guess {
 /// The camera of one of `kinds` that images `fitted` best, and its largest error at `checked`. The first
 /// kind with an error far below `tolerance_px` is taken, or that with the least error.
 pub(super) fn camera_like(
-    guess: &Guess,
-    [fitted, checked]: [&[Sample]; 2],
+    guess: &LensGuess,
+    [fitted, checked]: [&[LensSample]; 2],
     kinds: &[(Projection, DistortionModel)],
     tolerance_px: f64,
 ) -> Option<(CameraModel, f64)> {
@@ -101,8 +101,8 @@ pub(super) fn camera_like(
 }
 
 fn fit_camera(
-    guess: &Guess,
-    fitted: &[Sample],
+    guess: &LensGuess,
+    fitted: &[LensSample],
     projection: Projection,
     model: DistortionModel,
 ) -> Option<CameraModel> {
@@ -155,7 +155,7 @@ mod tests {
     fn a_camera_is_fitted_with_another_projection() {
         let camera = CameraModel::pinhole(640.0, 480.0, 900.0, false);
         let seen = samples(&camera, FIT_POINTS);
-        let guess = Guess {
+        let guess = LensGuess {
             camera,
             axis_px: [0.0; 2],
             stretch_px: 0.0,

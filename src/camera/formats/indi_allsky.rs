@@ -11,7 +11,7 @@
 use super::error::FormatError;
 use super::fit::grid;
 use super::pointing::Pointing;
-use super::sky::Sky;
+use super::sky::RmsSky;
 use crate::CameraModel;
 use crate::base::coords::{PixelPoint, Rotation};
 use crate::base::least_squares::levenberg_marquardt;
@@ -50,7 +50,7 @@ pub struct IndiAllskyLens {
 }
 
 /// A direction in horizontal axes (east, north, up), unrefracted, and its pixel.
-struct Point {
+struct HorizontalPoint {
     direction: Vector3<f64>,
     pixel: [f64; 2],
 }
@@ -137,9 +137,9 @@ fn points(
     camera: &CameraModel,
     pointing: &Pointing,
     julian_date: f64,
-) -> (Vec<Point>, Matrix3<f64>) {
+) -> (Vec<HorizontalPoint>, Matrix3<f64>) {
     let site = &pointing.site;
-    let sky = Sky::new(julian_date, site.lat_deg(), site.lon_deg(), false);
+    let sky = RmsSky::new(julian_date, site.lat_deg(), site.lon_deg(), false);
     let places = StarPlaces::at(&pointing.date, Some(*site), None);
     let apparent = places.apparent_attitude(&pointing.icrs_to_camera);
     let to_horizon = sky.to_horizon();
@@ -151,7 +151,7 @@ fn points(
     let points = grid(camera.width_px, camera.height_px, POINTS)
         .filter_map(|pixel| {
             let direction = direction(&PixelPoint::new(pixel[0], pixel[1]))?;
-            Some(Point { direction, pixel })
+            Some(HorizontalPoint { direction, pixel })
         })
         .collect();
     let to_lens = camera.lens_axes() * pointing.icrs_to_camera.matrix() * to_horizon.transpose();
@@ -195,7 +195,12 @@ fn turned(parameters: &[f64], to_lens: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// The best parameters, but for the first ones, which are `fixed`.
-fn fit(points: &[Point], to_lens: &Matrix3<f64>, start: &[f64], fixed: usize) -> Option<Vec<f64>> {
+fn fit(
+    points: &[HorizontalPoint],
+    to_lens: &Matrix3<f64>,
+    start: &[f64],
+    fixed: usize,
+) -> Option<Vec<f64>> {
     let all = |free: &[f64]| {
         start[..fixed]
             .iter()
@@ -217,9 +222,9 @@ fn fit(points: &[Point], to_lens: &Matrix3<f64>, start: &[f64], fixed: usize) ->
     Some(all(&found))
 }
 
-fn largest_px(points: &[Point], to_lens: &Matrix3<f64>, parameters: &[f64]) -> f64 {
+fn largest_px(points: &[HorizontalPoint], to_lens: &Matrix3<f64>, parameters: &[f64]) -> f64 {
     let to_lens = turned(parameters, to_lens);
-    let error = |point: &Point| {
+    let error = |point: &HorizontalPoint| {
         image(parameters, &(to_lens * point.direction)).map_or(f64::INFINITY, |[x, y]| {
             libm::hypot(x - point.pixel[0], y - point.pixel[1])
         })
@@ -311,7 +316,7 @@ mod tests {
             let lens = indi_allsky(&camera, &pointing).unwrap();
             assert!(lens.largest_error_px < tolerance_px, "{lens:?}");
             let julian_date = pointing.date.modified_julian_date().unwrap() + 2_400_000.5;
-            let sky = Sky::new(julian_date, 48.2, 16.4, false);
+            let sky = RmsSky::new(julian_date, 48.2, 16.4, false);
             let mut seen = 0;
             for star in 0..200 {
                 let star = f64::from(star);

@@ -17,7 +17,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// The sky of a site at a date.
 #[derive(Debug, Clone)]
-pub(super) struct Sky {
+pub(super) struct RmsSky {
     /// From the axes of J2000 to those of the date.
     pub(super) to_date: Matrix3<f64>,
     /// In the axes of the date.
@@ -25,7 +25,7 @@ pub(super) struct Sky {
     is_refracted: bool,
 }
 
-impl Sky {
+impl RmsSky {
     pub(super) fn new(julian_date: f64, lat_deg: f64, lon_deg: f64, is_refracted: bool) -> Self {
         let turn_rad = (sidereal_time_deg(julian_date) + lon_deg) * RAD_PER_DEG;
         let zenith = UnitVector::from_ra_dec(turn_rad, lat_deg * RAD_PER_DEG);

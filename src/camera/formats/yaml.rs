@@ -35,7 +35,7 @@ pub(super) fn write_matrix(
 
 /// An entry of the file.
 #[derive(Debug)]
-struct Entry {
+struct YamlEntry {
     line: usize,
     key: String,
     value: String,
@@ -46,7 +46,7 @@ struct Entry {
 /// A file of numbers, words and matrices. Names are compared without regard to case.
 #[derive(Debug)]
 pub(super) struct Document {
-    entries: Vec<Entry>,
+    entries: Vec<YamlEntry>,
 }
 
 /// A matrix and where it was found.
@@ -60,7 +60,7 @@ pub(super) struct Matrix {
 impl Document {
     /// Reads the entries of a mapping, and those of the mappings one level below.
     pub(super) fn read(text: &str) -> Result<Self, FormatError> {
-        let mut entries: Vec<Entry> = Vec::new();
+        let mut entries: Vec<YamlEntry> = Vec::new();
         let mut lines = text.lines().enumerate();
         while let Some((index, raw)) = lines.next() {
             let mut content = without_comment(raw).to_owned();
@@ -85,7 +85,7 @@ impl Document {
                 if entries.iter().any(|entry| entry.key == name) {
                     return Err(syntax(index, raw, "a name that no line before it has"));
                 }
-                entries.push(Entry {
+                entries.push(YamlEntry {
                     line: index,
                     key: name,
                     value,
@@ -100,7 +100,7 @@ impl Document {
         Ok(Self { entries })
     }
 
-    fn find(&self, keys: &[&'static str]) -> Option<&Entry> {
+    fn find(&self, keys: &[&'static str]) -> Option<&YamlEntry> {
         let mut entries = self.entries.iter();
         entries.find(|entry| keys.contains(&entry.key.as_str()))
     }

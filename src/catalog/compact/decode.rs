@@ -20,7 +20,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// [`CompactError`] for anything that [`encode`](fn@super::encode) does not write: another version,
 /// a wrong length or checksum, a value out of range, stars or names out of order.
 pub(in crate::catalog) fn decode(bytes: &[u8]) -> Result<Contents, CompactError> {
-    let header = Header::read(bytes)?;
+    let header = CompactHeader::read(bytes)?;
     header.check_length(bytes)?;
     check_checksum(bytes)?;
 
@@ -37,7 +37,7 @@ pub(in crate::catalog) fn decode(bytes: &[u8]) -> Result<Contents, CompactError>
     })
 }
 
-struct Header {
+struct CompactHeader {
     ids: IdEncoding,
     stars: usize,
     names: usize,
@@ -46,7 +46,7 @@ struct Header {
     epoch_year: f64,
 }
 
-impl Header {
+impl CompactHeader {
     fn read(bytes: &[u8]) -> Result<Self, CompactError> {
         let Some(header) = bytes.first_chunk::<HEADER_BYTES>() else {
             return invalid(bytes.len(), "the end of the file", "a header of 36 bytes");
@@ -123,7 +123,7 @@ fn check_checksum(bytes: &[u8]) -> Result<(), CompactError> {
     invalid(payload.len(), found, expected)
 }
 
-fn decode_stars(input: &mut ByteReader, header: &Header) -> Result<Vec<Star>, CompactError> {
+fn decode_stars(input: &mut ByteReader, header: &CompactHeader) -> Result<Vec<Star>, CompactError> {
     let count = header.stars;
     let ids = header.ids.decode(input, count)?;
     let (ra_at, ras) = (input.at, input.column::<4>(count));
@@ -162,7 +162,10 @@ fn decode_stars(input: &mut ByteReader, header: &Header) -> Result<Vec<Star>, Co
     stars.or_else(|_| (0..count).map(star).collect())
 }
 
-fn decode_names(input: &mut ByteReader, header: &Header) -> Result<Vec<StarName>, CompactError> {
+fn decode_names(
+    input: &mut ByteReader,
+    header: &CompactHeader,
+) -> Result<Vec<StarName>, CompactError> {
     let (indices_at, indices) = (input.at, input.column::<4>(header.names));
     let lengths = input.column::<1>(header.names);
     let mut names: Vec<StarName> = Vec::with_capacity(header.names);

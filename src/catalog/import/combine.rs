@@ -1,7 +1,7 @@
 //! Combines the files of a catalogue.
 
 use super::summary::ImportSummary;
-use super::tally::{Format, ImportTally};
+use super::tally::{ImportTally, RowParser};
 use crate::catalog::{Catalog, CatalogError, Star, StarId};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -21,7 +21,7 @@ pub struct SourceFile {
 
 /// A catalogue, and the files it was read from.
 #[derive(Debug, Clone)]
-pub struct Reading {
+pub struct LoadedCatalog {
     /// The catalogue.
     pub catalog: Catalog,
     /// The source files, in the order of their names; none for the compact form.
@@ -31,7 +31,7 @@ pub struct Reading {
 /// The records of one file of a catalogue.
 pub(in crate::catalog) struct CatalogPart {
     pub(in crate::catalog) path: PathBuf,
-    pub(in crate::catalog) format: Box<dyn Format + Send>,
+    pub(in crate::catalog) format: Box<dyn RowParser + Send>,
     pub(in crate::catalog) tally: ImportTally,
 }
 
@@ -43,7 +43,7 @@ pub(in crate::catalog) fn combine(
     path: &Path,
     title: String,
     mut parts: Vec<CatalogPart>,
-) -> Result<Reading, CatalogError> {
+) -> Result<LoadedCatalog, CatalogError> {
     remove_repeated(&mut parts)?;
     let (mut stars, mut names, mut files) = (Vec::new(), Vec::new(), Vec::new());
     for mut part in parts {
@@ -71,7 +71,7 @@ pub(in crate::catalog) fn combine(
     let mut named = HashSet::new();
     names.retain(|(id, _)| named.insert(*id));
     let catalog = Catalog::new(title, stars, names)?;
-    Ok(Reading { catalog, files })
+    Ok(LoadedCatalog { catalog, files })
 }
 
 /// Removes all but the first record of each identifier, and of each name without an identifier.

@@ -12,8 +12,8 @@ mod summary;
 mod tally;
 
 pub(super) use combine::{CatalogPart, combine};
-pub use combine::{Reading, SourceFile};
+pub use combine::{LoadedCatalog, SourceFile};
 pub(super) use opened::OpenedFile;
 pub(super) use rows::{ImportRows, Row};
 pub use summary::ImportSummary;
-pub(super) use tally::{Format, ImportTally, NamedStar, Parsed, Rejection, both_or_neither};
+pub(super) use tally::{ImportTally, NamedStar, Parsed, Rejection, RowParser, both_or_neither};

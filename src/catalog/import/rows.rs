@@ -38,7 +38,7 @@ impl Row<'_> {
 }
 
 /// The range of a row in the buffer, with its line end.
-struct Span {
+struct RowRange {
     line: u64,
     range: Range<usize>,
 }
@@ -102,7 +102,7 @@ impl<R: BufRead> ImportRows<R> {
 
     /// The rows that are in memory, at least one; none at the end.
     pub(in crate::catalog) fn batch(&mut self) -> io::Result<Vec<Row<'_>>> {
-        let mut spans: Vec<Span> = self.next_span()?.into_iter().collect();
+        let mut spans: Vec<RowRange> = self.next_span()?.into_iter().collect();
         while (1..BATCH_ROWS).contains(&spans.len())
             && let Some(span) = self.take_span()
         {
@@ -111,7 +111,7 @@ impl<R: BufRead> ImportRows<R> {
         Ok(spans.into_iter().map(|span| self.row(span)).collect())
     }
 
-    fn row(&self, span: Span) -> Row<'_> {
+    fn row(&self, span: RowRange) -> Row<'_> {
         let bytes = &self.buffer[span.range];
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         Row {
@@ -120,7 +120,7 @@ impl<R: BufRead> ImportRows<R> {
         }
     }
 
-    fn next_span(&mut self) -> io::Result<Option<Span>> {
+    fn next_span(&mut self) -> io::Result<Option<RowRange>> {
         loop {
             if let Some(span) = self.take_span() {
                 return Ok(Some(span));
@@ -148,7 +148,7 @@ impl<R: BufRead> ImportRows<R> {
     }
 
     /// The next row that is complete in the buffer.
-    fn take_span(&mut self) -> Option<Span> {
+    fn take_span(&mut self) -> Option<RowRange> {
         const END_OF_FILE_MARK: u8 = 0x1a;
         let start = self.next_byte;
         let found = self.row_length(start);
@@ -167,7 +167,7 @@ impl<R: BufRead> ImportRows<R> {
         if self.next_line > MAX_LINES {
             return self.refuse(&format!("more than {MAX_LINES} lines"));
         }
-        let span = Span {
+        let span = RowRange {
             line: self.next_line,
             range: start..start + length,
         };
@@ -177,7 +177,7 @@ impl<R: BufRead> ImportRows<R> {
     }
 
     /// Ends reading with an error.
-    fn refuse(&mut self, found: &str) -> Option<Span> {
+    fn refuse(&mut self, found: &str) -> Option<RowRange> {
         let message = format!("found {found}, which no catalog has");
         self.error = Some(io::Error::new(ErrorKind::InvalidData, message));
         self.ended = true;
@@ -195,7 +195,7 @@ impl<R: BufRead> ImportRows<R> {
             return Some((first_end, 1));
         };
         let (mut end, mut lines) = (first_end, 1);
-        let mut cells = Cells::new(separator);
+        let mut cells = CellScanner::new(separator);
         while cells.end_in_quotes(&rest[..end]) {
             let searched = &rest[end..rest.len().min(QUOTED_BYTES_MAX.max(end))];
             match memchr(b'\n', searched) {
@@ -213,14 +213,14 @@ impl<R: BufRead> ImportRows<R> {
 }
 
 /// Cells of a row that is looked through as it grows.
-struct Cells {
+struct CellScanner {
     separator: u8,
     seen_bytes: usize,
     is_quoted: bool,
     is_at_start: bool,
 }
 
-impl Cells {
+impl CellScanner {
     fn new(separator: u8) -> Self {
         Self {
             separator,

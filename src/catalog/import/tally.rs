@@ -50,7 +50,7 @@ pub(in crate::catalog) fn both_or_neither<T>(
 }
 
 /// A parser for the rows of one kind of file.
-pub(in crate::catalog) trait Format: Sync {
+pub(in crate::catalog) trait RowParser: Sync {
     /// The catalogue that the file is part of, if it is a known one.
     fn catalog(&self) -> Option<&'static str> {
         None
@@ -82,7 +82,7 @@ impl ImportTally {
     /// Parses all rows, on all threads.
     pub(in crate::catalog) fn read<R: BufRead>(
         rows: &mut ImportRows<R>,
-        format: &dyn Format,
+        format: &dyn RowParser,
         path: &Path,
     ) -> Result<Self, CatalogError> {
         /// With more unreadable records than this, and a share above the limit, reading stops.
@@ -112,7 +112,7 @@ impl ImportTally {
         Ok(tally)
     }
 
-    fn parse(rows: &[Row], format: &dyn Format) -> Self {
+    fn parse(rows: &[Row], format: &dyn RowParser) -> Self {
         let mut tally = Self::default();
         for &row in rows {
             tally.add(row.line, format.parse(row));
@@ -153,7 +153,11 @@ impl ImportTally {
     }
 
     /// Rejects a file with too many unreadable records, or with a defect that its format detects.
-    pub(super) fn check(&mut self, format: &dyn Format, path: &Path) -> Result<(), CatalogError> {
+    pub(super) fn check(
+        &mut self,
+        format: &dyn RowParser,
+        path: &Path,
+    ) -> Result<(), CatalogError> {
         let reason = format.diagnose(self);
         if self.exceeds_limit() {
             return Err(CatalogError::TooManyUnreadable {
@@ -174,7 +178,7 @@ impl ImportTally {
     }
 
     /// Removes the stars for which `keep` is false, as repetitions.
-    pub(super) fn remove_repeated(&mut self, format: &dyn Format, keep: &[bool]) {
+    pub(super) fn remove_repeated(&mut self, format: &dyn RowParser, keep: &[bool]) {
         let (location, label) = format.id_location();
         let names: HashMap<StarId, &str> = self.names.iter().map(|(id, n)| (*id, &**n)).collect();
         let mut removed = HashSet::new();

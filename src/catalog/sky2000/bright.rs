@@ -6,7 +6,7 @@ use crate::base::files;
 use crate::base::interrupt::Interrupt;
 use crate::catalog::CatalogError;
 use crate::catalog::error::quoted;
-use crate::catalog::import::{Format, ImportRows, ImportSummary, ImportTally, OpenedFile};
+use crate::catalog::import::{ImportRows, ImportSummary, ImportTally, OpenedFile, RowParser};
 use std::io;
 use std::path::Path;
 

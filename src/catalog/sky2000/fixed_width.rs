@@ -3,7 +3,7 @@
 use super::columns::{FIXED_COLUMNS, StarColumn};
 use super::record::Sky2000Record;
 use crate::catalog::error::{RecordError, RecordLocation, quoted};
-use crate::catalog::import::{Format, NamedStar, Parsed, Rejection, Row};
+use crate::catalog::import::{NamedStar, Parsed, Rejection, Row, RowParser};
 use std::borrow::Cow;
 
 /// The length of a record without its line end, in bytes.
@@ -22,7 +22,7 @@ impl FixedWidth {
     }
 }
 
-impl Format for FixedWidth {
+impl RowParser for FixedWidth {
     fn catalog(&self) -> Option<&'static str> {
         Some("SKY2000 Master Catalog")
     }

@@ -19,4 +19,4 @@ mod roles;
 mod row;
 mod sky2000;
 
-pub(super) use reader::Table;
+pub(super) use reader::CatalogTable;

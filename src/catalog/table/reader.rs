@@ -4,11 +4,13 @@ use super::cells::{SEPARATORS, may_quote, split, units_in};
 use super::columns::GeneralColumns;
 use super::headings::Heading;
 use super::plausibility::{look_like_hours, look_swapped};
-use super::row::TableRow;
+use super::row::GeneralRow;
 use super::sky2000::Sky2000Columns;
 use crate::catalog::CatalogError;
 use crate::catalog::error::{RecordError, RecordLocation, quoted};
-use crate::catalog::import::{Format, ImportRows, ImportTally, NamedStar, Parsed, Rejection, Row};
+use crate::catalog::import::{
+    ImportRows, ImportTally, NamedStar, Parsed, Rejection, Row, RowParser,
+};
 use crate::catalog::sky2000::StarColumn;
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -16,22 +18,22 @@ use std::io::BufRead;
 use std::path::Path;
 
 /// A table whose headings have been read.
-pub(in crate::catalog) struct Table {
+pub(in crate::catalog) struct CatalogTable {
     separator: u8,
     /// The number of cells of a row.
     width: usize,
     /// The lines of headings and units, which are repeated where tables were joined.
     headings: Vec<Vec<u8>>,
-    columns: Columns,
+    columns: CatalogColumns,
 }
 
 /// The columns of a table.
-enum Columns {
+enum CatalogColumns {
     Sky2000(Box<Sky2000Columns>),
     General(Box<GeneralColumns>),
 }
 
-impl Table {
+impl CatalogTable {
     /// Reads the headings.
     pub(in crate::catalog) fn open<R: BufRead>(
         rows: &mut ImportRows<R>,
@@ -61,7 +63,7 @@ impl Table {
         if let (Some(row), Some(_)) = (below, &units) {
             headings.push(row.bytes.to_owned());
         }
-        let columns = Columns::find(&labels, units, &notes).map_err(|missing| {
+        let columns = CatalogColumns::find(&labels, units, &notes).map_err(|missing| {
             if missing.is_empty() {
                 return CatalogError::unknown_kind(path, text);
             }
@@ -99,9 +101,9 @@ impl Table {
         }
         let (line, cells) = (row.line, &cells[..]);
         match &self.columns {
-            Columns::Sky2000(columns) => columns.parse(line, cells),
-            Columns::General(columns) => {
-                let row = TableRow {
+            CatalogColumns::Sky2000(columns) => columns.parse(line, cells),
+            CatalogColumns::General(columns) => {
+                let row = GeneralRow {
                     columns,
                     line,
                     cells,
@@ -112,7 +114,7 @@ impl Table {
     }
 }
 
-impl Columns {
+impl CatalogColumns {
     /// # Errors
     /// The missing columns; none if the table does not seem to be one of stars.
     fn find(
@@ -133,25 +135,25 @@ impl Columns {
     }
 }
 
-impl Format for Table {
+impl RowParser for CatalogTable {
     fn catalog(&self) -> Option<&'static str> {
-        matches!(self.columns, Columns::Sky2000(..)).then_some("SKY2000 Master Catalog")
+        matches!(self.columns, CatalogColumns::Sky2000(..)).then_some("SKY2000 Master Catalog")
     }
 
     fn kind(&self) -> String {
         match &self.columns {
-            Columns::Sky2000(..) => "table with SKY2000's columns".to_owned(),
-            Columns::General(columns) => format!("table: {}", columns.description()),
+            CatalogColumns::Sky2000(..) => "table with SKY2000's columns".to_owned(),
+            CatalogColumns::General(columns) => format!("table: {}", columns.description()),
         }
     }
 
     fn id_location(&self) -> (RecordLocation, String) {
         match &self.columns {
-            Columns::Sky2000(columns) => {
+            CatalogColumns::Sky2000(columns) => {
                 let id = StarColumn::Id;
                 (columns.location_of(id), id.label().to_owned())
             }
-            Columns::General(columns) => columns.id_location(),
+            CatalogColumns::General(columns) => columns.id_location(),
         }
     }
 
@@ -169,7 +171,7 @@ impl Format for Table {
     }
 
     fn diagnose(&self, tally: &ImportTally) -> Option<String> {
-        let Columns::General(columns) = &self.columns else {
+        let CatalogColumns::General(columns) = &self.columns else {
             return None;
         };
         if tally.exceeds_limit() && look_swapped(tally) {

@@ -20,13 +20,13 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::Ordering;
 
 /// The cells of a row.
-pub(super) struct TableRow<'a> {
+pub(super) struct GeneralRow<'a> {
     pub(super) columns: &'a GeneralColumns,
     pub(super) line: u64,
     pub(super) cells: &'a [Cow<'a, str>],
 }
 
-impl TableRow<'_> {
+impl GeneralRow<'_> {
     /// Parses the star and its name.
     pub(super) fn star(&self) -> Parsed<NamedStar> {
         let columns = self.columns;

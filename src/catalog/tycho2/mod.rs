@@ -25,10 +25,10 @@ pub(super) use johnson::johnson;
 pub(super) use layout::Tycho2;
 
 use super::error::RecordLocation;
-use super::import::{Format, NamedStar, Parsed, Row};
+use super::import::{NamedStar, Parsed, Row, RowParser};
 use record::Tycho2Record;
 
-impl Format for Tycho2 {
+impl RowParser for Tycho2 {
     fn catalog(&self) -> Option<&'static str> {
         Some("Tycho-2 Catalogue")
     }

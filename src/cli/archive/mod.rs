@@ -3,15 +3,15 @@
 mod nights;
 mod page;
 
-use super::exit::{CommandError, Exit, Outcome};
-use super::options::format::Format;
+use super::exit::{CommandError, CommandOutput, Exit};
+use super::options::format::OutputFormat;
 use super::output::files::{make_directory, write_each};
 use super::output::messages::report_warning;
 use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
 use nights::{NightLine, nights_text};
-use starpipe::archive::{Archive, Status, merge, status, summary};
+use starpipe::archive::{Archive, ArchiveStatus, merge, status, summary};
 use starpipe::base::format::{printable, ranges};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -47,8 +47,8 @@ struct StatusArgs {
     /// Directory that process --out-parquet has written
     directory: PathBuf,
     /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    format: OutputFormat,
 }
 
 #[derive(Debug, Args)]
@@ -67,15 +67,15 @@ struct ReportArgs {
     #[command(flatten)]
     html: HtmlOption,
     /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    format: OutputFormat,
 }
 
 /// Frames that could not be read of which the text for people tells.
 const UNREAD_SHOWN: usize = 10;
 
 /// `starpipe archive`
-pub(crate) fn archive(arguments: &ArchiveArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn archive(arguments: &ArchiveArgs) -> Result<CommandOutput, CommandError> {
     match &arguments.command {
         ArchiveCommand::Status(arguments) => tell_status(arguments),
         ArchiveCommand::Merge(arguments) => merge_tables(arguments),
@@ -83,22 +83,22 @@ pub(crate) fn archive(arguments: &ArchiveArgs) -> Result<Outcome, CommandError> 
     }
 }
 
-fn tell_status(arguments: &StatusArgs) -> Result<Outcome, CommandError> {
+fn tell_status(arguments: &StatusArgs) -> Result<CommandOutput, CommandError> {
     let status = status(&Archive::open(&arguments.directory)?)?;
     let text = match arguments.format {
-        Format::Text => status_text(&status),
-        Format::Json => json_line(&status)?,
-        Format::Csv => csv_table(status.unread.iter())?,
+        OutputFormat::Text => status_text(&status),
+        OutputFormat::Json => json_line(&status)?,
+        OutputFormat::Csv => csv_table(status.unread.iter())?,
     };
     let exit = if status.is_complete() {
         Exit::Success
     } else {
         Exit::Unmet
     };
-    Ok(Outcome { text, exit })
+    Ok(CommandOutput { text, exit })
 }
 
-fn status_text(status: &Status) -> String {
+fn status_text(status: &ArchiveStatus) -> String {
     let mut text = format!(
         "parts      {} of {}\nfiles      {} of {}\nframes     {}: {} identified, {} not identified, {} unread\n",
         status.parts_done,
@@ -131,15 +131,15 @@ fn status_text(status: &Status) -> String {
     text
 }
 
-fn merge_tables(arguments: &MergeArgs) -> Result<Outcome, CommandError> {
+fn merge_tables(arguments: &MergeArgs) -> Result<CommandOutput, CommandError> {
     let archive = Archive::open(&arguments.directory)?;
     make_directory(&arguments.out)?;
     let files = merge(&archive, &arguments.out)?;
     let names = files.map(|path| format!("{}\n", path.display()));
-    Ok(Outcome::success(names.concat()))
+    Ok(CommandOutput::success(names.concat()))
 }
 
-fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
+fn report(arguments: &ReportArgs) -> Result<CommandOutput, CommandError> {
     let archive = Archive::open(&arguments.directory)?;
     let default = || arguments.directory.join("report.html");
     let page_path = arguments.html.checked_path(&[], default)?;
@@ -154,14 +154,14 @@ fn report(arguments: &ReportArgs) -> Result<Outcome, CommandError> {
     let page = page_path.map(|path| super::page::file(&path, &page::of(&archive, &nights)?));
     let all_written = write_each(page);
     let text = match arguments.format {
-        Format::Text => nights_text(&nights),
-        Format::Json => json_lines(nights.iter())?,
-        Format::Csv => csv_table(nights.iter().map(NightLine::of))?,
+        OutputFormat::Text => nights_text(&nights),
+        OutputFormat::Json => json_lines(nights.iter())?,
+        OutputFormat::Csv => csv_table(nights.iter().map(NightLine::of))?,
     };
     let exit = if damaged.is_empty() {
         Exit::Success
     } else {
         Exit::Failure
     };
-    Ok(Outcome { text, exit }.if_written(all_written))
+    Ok(CommandOutput { text, exit }.if_written(all_written))
 }

@@ -1,7 +1,7 @@
 //! The nights of an archive as text and as lines of CSV.
 
 use serde::Serialize;
-use starpipe::archive::NightSummary;
+use starpipe::archive::CameraNight;
 use starpipe::base::format::{counted, printable};
 use std::fmt::Write as _;
 
@@ -24,7 +24,7 @@ pub(super) struct NightLine<'a> {
 }
 
 impl<'a> NightLine<'a> {
-    pub(super) fn of(night: &'a NightSummary) -> Self {
+    pub(super) fn of(night: &'a CameraNight) -> Self {
         Self {
             night: &night.night,
             camera: &night.camera,
@@ -43,7 +43,7 @@ impl<'a> NightLine<'a> {
     }
 }
 
-fn reasons_text(night: &NightSummary) -> String {
+fn reasons_text(night: &CameraNight) -> String {
     let counted = night.reasons.iter();
     let counted = counted.map(|(code, frames)| format!("{code} {frames}"));
     counted.collect::<Vec<_>>().join(", ")
@@ -55,7 +55,7 @@ fn or<'a>(text: &'a str, none: &'a str) -> &'a str {
 }
 
 /// The nights as a table for people.
-pub(super) fn nights_text(nights: &[NightSummary]) -> String {
+pub(super) fn nights_text(nights: &[CameraNight]) -> String {
     let mut text =
         "night       camera            frames  identified   limit  predicted  difference     \
                     sky  zero point  drift (deg)  reasons\n"

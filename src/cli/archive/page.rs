@@ -3,13 +3,13 @@
 use super::nights::{NightLine, nights_text};
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{codes_note, figure, options, table, thumbnails};
-use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
+use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use serde::Serialize;
 use serde_json::Value;
-use starpipe::archive::{Archive, FrameSummary, NightSummary, frames, status};
+use starpipe::archive::{Archive, CameraNight, FrameSummary, frames, status};
 use starpipe::base::format::counted;
 use starpipe::base::statistics::{median, quantile};
-use starpipe::report::page::{Fact, Page, PageFigure};
+use starpipe::report::page::{Fact, PageContent, PageFigure};
 use std::collections::BTreeMap;
 
 /// Points of a figure; with more frames, each is the median of several.
@@ -21,7 +21,7 @@ const NO_PICTURES: &str =
     "There are no pictures of the frames that failed: none of them can be read where it was.";
 
 /// The page of the frames and nights of an archive.
-pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<Page> {
+pub(super) fn of(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result<PageContent> {
     let mut frames = frames(archive)?;
     let failed = |frame: &FrameSummary| !frame.is_identified();
     let reasons = reasons(frames.iter().filter(|frame| failed(frame)));
@@ -44,7 +44,7 @@ pub(super) fn of(archive: &Archive, nights: &[NightSummary]) -> anyhow::Result<P
         &csv_table(nights.iter().map(NightLine::of))?,
     )?);
     tables.push(table("Frames", &csv_table(frames.iter())?)?);
-    Ok(Page {
+    Ok(PageContent {
         title: format!("Archive {}", archive.directory().display()),
         question: format!("What do {} show?", counted(frames.len(), "frame")),
         answer: answer(&frames),
@@ -108,7 +108,7 @@ fn answer(frames: &[FrameSummary]) -> String {
     text + "."
 }
 
-fn facts(frames: &[FrameSummary], nights: &[NightSummary]) -> Vec<Fact> {
+fn facts(frames: &[FrameSummary], nights: &[CameraNight]) -> Vec<Fact> {
     let mut facts = Vec::new();
     let mut add = |name: &str, unit: &str, value: fn(&FrameSummary) -> Option<f64>| {
         let mut values: Vec<f64> = frames.iter().filter_map(value).collect();
@@ -189,14 +189,14 @@ fn limits(frames: &[FrameSummary]) -> anyhow::Result<Vec<PageFigure>> {
         };
         dated.chunks(together).filter_map(point).collect()
     };
-    let mut layers = vec![Layer::new(
+    let mut layers = vec![PlotLayer::new(
         "measured",
         BLUE,
         Marks::Points(points(|frame| frame.limit50_vmag)),
     )];
     let predicted = points(|frame| frame.predicted_limit50_vmag);
     if !predicted.is_empty() {
-        layers.push(Layer::new("predicted", ORANGE, Marks::Line(predicted)));
+        layers.push(PlotLayer::new("predicted", ORANGE, Marks::Line(predicted)));
     }
     let panel = Panel {
         title: "Half of the stars are found at".to_owned(),

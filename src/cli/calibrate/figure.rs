@@ -1,6 +1,6 @@
 //! The figure of a calibration: stars over the frame, and their mean residuals.
 
-use crate::cli::plot::{Axis, BLACK, BLUE, Cell, Layer, Marks, Panel, Sheet};
+use crate::cli::plot::{Axis, BLACK, BLUE, FilledRectangle, Marks, Panel, PlotLayer, Sheet};
 use plotters::style::RGBColor;
 use starpipe::identify::lens::{Coverage, CoverageCell, LensCalibration};
 
@@ -53,7 +53,7 @@ fn stars(coverage: &Coverage) -> Panel {
         // From white without stars to blue.
         let share = of.stars as f64 / most as f64;
         let mixed = |to: u8| (255.0 + (f64::from(to) - 255.0) * share).round() as u8;
-        Cell {
+        FilledRectangle {
             x: [x - half[0], x + half[0]],
             y: [-y - half[1], -y + half[1]],
             color: RGBColor(mixed(BLUE.0), mixed(BLUE.1), mixed(BLUE.2)),
@@ -74,8 +74,8 @@ fn stars(coverage: &Coverage) -> Panel {
         x,
         y,
         layers: vec![
-            Layer::unnamed(BLACK, Marks::Cells(rows.map(cell).collect())),
-            Layer::unnamed(BLACK, Marks::Texts(counts.collect())),
+            PlotLayer::unnamed(BLACK, Marks::Cells(rows.map(cell).collect())),
+            PlotLayer::unnamed(BLACK, Marks::Texts(counts.collect())),
         ],
     }
 }
@@ -99,8 +99,8 @@ fn residuals(measured: &LensCalibration) -> Panel {
         x,
         y,
         layers: vec![
-            Layer::unnamed(BLUE, Marks::Lines(known().map(arrow).collect())),
-            Layer::unnamed(BLACK, Marks::Texts(tails.collect())),
+            PlotLayer::unnamed(BLUE, Marks::Lines(known().map(arrow).collect())),
+            PlotLayer::unnamed(BLACK, Marks::Texts(tails.collect())),
         ],
     }
 }

@@ -5,7 +5,7 @@ mod figure;
 mod lens_file;
 mod page;
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::frames::FrameList;
 use super::options::calibration::CalibrationOptions;
 use super::options::catalog::CatalogOptions;
@@ -18,7 +18,7 @@ use super::output::rows::json_line;
 use super::page::HtmlOption;
 use super::plot::PlotFile;
 use super::progress::frames_bar;
-use super::solving::{Inputs, Plan, Sink, Solved, Solver};
+use super::solving::{InputSolver, Inputs, Sink, SolvedImage, SolvingPlan};
 use clap::Args;
 use exports::ExportOptions;
 use starpipe::frame::{Cameras, ImageName, PageChoice};
@@ -67,7 +67,7 @@ pub(crate) struct CalibrateArgs {
 }
 
 /// `starpipe calibrate`
-pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<CommandOutput, CommandError> {
     if !arguments.force {
         let files = arguments.out.as_deref().into_iter();
         let files = files.chain(arguments.exports.paths());
@@ -98,7 +98,7 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<Outcome, CommandErro
     });
     let all_written = write_each(files(&arguments, &measured, page));
     let has_failed = failed || unread > 0;
-    let outcome = Outcome {
+    let outcome = CommandOutput {
         text: match arguments.format {
             PageFormat::Text => report.to_text(),
             PageFormat::Json => json_line(&report)?,
@@ -124,12 +124,12 @@ impl CalibrateArgs {
         lens.map_or("calibrate.html".into(), |path| path.with_extension("html"))
     }
 
-    fn plan(&self) -> Result<Plan, CommandError> {
+    fn plan(&self) -> Result<SolvingPlan, CommandError> {
         let camera = self.hints.description()?;
         let mut options = self.hints.options()?;
         // The lens is what is to be measured.
         options.refine_lens = true;
-        Ok(Plan {
+        Ok(SolvingPlan {
             options,
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
@@ -142,12 +142,12 @@ impl CalibrateArgs {
 type Taken = Result<LensFrame, LeftOutFrame>;
 
 /// Takes the stars of frames.
-struct Stars;
+struct LensFrameSink;
 
-impl Sink for Stars {
+impl Sink for LensFrameSink {
     type Made = Taken;
 
-    fn make(&self, image: &ImageName, solved: &Solved) -> Taken {
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Taken {
         let name = image.to_string();
         solved
             .solution
@@ -168,18 +168,18 @@ struct SolvedFrames {
 
 fn solve(
     arguments: &CalibrateArgs,
-    plan: &Plan,
+    plan: &SolvingPlan,
     paths: &[PathBuf],
 ) -> Result<SolvedFrames, CommandError> {
     let progress = frames_bar(paths.len() as u64);
     let (mut frames, mut left_out, mut unread) = (Vec::new(), Vec::new(), 0);
     let catalog = arguments.catalog.with_index(|pool, indexed| {
-        let solver = Solver {
+        let solver = InputSolver {
             pool,
             inputs: &Inputs::Frames(PageChoice::default()),
             context: plan.context(indexed),
             memory: plan.memory,
-            sink: Stars,
+            sink: LensFrameSink,
         };
         solver.solve_all(paths, |images| {
             progress.inc(1);

@@ -6,7 +6,7 @@ use crate::cli::page::{figure, options, table, thumbnails};
 use starpipe::base::format::counted;
 use starpipe::identify::lens::LensCalibration;
 use starpipe::report::LensReport;
-use starpipe::report::page::{Fact, Page};
+use starpipe::report::page::{Fact, PageContent};
 
 /// Frames that measure a lens well.
 const ENOUGH_FRAMES: usize = 20;
@@ -21,7 +21,7 @@ pub(super) fn of(
     report: &LensReport,
     unread: usize,
     catalog: Fact,
-) -> anyhow::Result<Page> {
+) -> anyhow::Result<PageContent> {
     let mut tables = vec![table("Frames", &csv_table(report.frames.iter())?)?];
     if !report.left_out.is_empty() {
         let csv = csv_table(report.left_out.iter())?;
@@ -30,7 +30,7 @@ pub(super) fn of(
     let left_out = report.left_out.iter();
     let left_out = left_out.map(|frame| (frame.frame.clone(), frame.text.clone()));
     let facts = report.lines().into_iter();
-    Ok(Page {
+    Ok(PageContent {
         title: "The lens of a camera".to_owned(),
         question: format!(
             "Which lens made {} of {} × {} px?",

@@ -1,6 +1,6 @@
 //! The figures of dark frames: how many pixels have which level, and which noise.
 
-use crate::cli::plot::{Axis, BLUE, Layer, Marks, Panel, Sheet};
+use crate::cli::plot::{Axis, BLUE, Marks, Panel, PlotLayer, Sheet};
 use starpipe::base::format::{counted, five_digits};
 use starpipe::calibration::darks::Darks;
 
@@ -76,7 +76,7 @@ fn histogram(title: &str, axis: &str, values: &[f32], step: f64) -> Option<Panel
             from: Some(0.0),
             ..Axis::of("pixels")
         },
-        layers: vec![Layer::unnamed(
+        layers: vec![PlotLayer::unnamed(
             BLUE,
             Marks::Bars(counts.iter().enumerate().map(bar).collect()),
         )],

@@ -4,9 +4,9 @@ mod figure;
 mod files;
 mod page;
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::frames::{FrameList, for_each_frame};
-use super::options::format::Format;
+use super::options::format::OutputFormat;
 use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
@@ -52,8 +52,8 @@ pub(crate) struct DarksArgs {
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, default_value_t = HOT_SIGMA)]
     hot_sigma: f64,
     /// What to print: csv has a row for each frame
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    format: OutputFormat,
     /// Also write the master dark, the noise of each pixel and the hot pixels into this directory
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -87,7 +87,7 @@ impl FromStr for ExposureOf {
 }
 
 /// `starpipe darks`
-pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn darks(arguments: DarksArgs) -> Result<CommandOutput, CommandError> {
     let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
     check_exposures(&arguments.exposure, &frames)?;
     let page_path = arguments.page_path(&frames)?;
@@ -115,11 +115,11 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<Outcome, CommandError> {
     };
     let page = page_path.map(|path| super::page::file(&path, &page::of(&darks, unread)?));
     let all_written = write_each(results.into_iter().chain(page));
-    let outcome = Outcome {
+    let outcome = CommandOutput {
         text: match arguments.format {
-            Format::Text => darks.report().to_text(),
-            Format::Json => json_line(&darks.report())?,
-            Format::Csv => csv_table(darks.frame_rows())?,
+            OutputFormat::Text => darks.report().to_text(),
+            OutputFormat::Json => json_line(&darks.report())?,
+            OutputFormat::Csv => csv_table(darks.frame_rows())?,
         },
         exit: Exit::of(failed || unread > 0),
     };

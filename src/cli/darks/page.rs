@@ -6,13 +6,13 @@ use crate::cli::output::rows::csv_table;
 use crate::cli::page;
 use starpipe::base::format::counted;
 use starpipe::calibration::darks::{Darks, DarksReport};
-use starpipe::report::page::{Fact, Page};
+use starpipe::report::page::{Fact, PageContent};
 
 /// Hot pixels in the table: a detector with more is better looked at in hot-pixels.csv.
 const MOST_HOT: usize = 5000;
 
 /// The page of what was measured. `unread` files could not be read.
-pub(super) fn of(darks: &Darks, unread: usize) -> anyhow::Result<Page> {
+pub(super) fn of(darks: &Darks, unread: usize) -> anyhow::Result<PageContent> {
     let report = darks.report();
     let hot: String = hot_pixels_table(darks)?
         .split_inclusive('\n')
@@ -33,7 +33,7 @@ pub(super) fn of(darks: &Darks, unread: usize) -> anyhow::Result<Page> {
     }
     let facts = report.lines().into_iter();
     let full_scale = report.full_scale_source.clone().unwrap_or_default();
-    Ok(Page {
+    Ok(PageContent {
         title: "Dark frames".to_owned(),
         question: format!(
             "What does the detector of {} × {} px record without light?",
@@ -46,7 +46,7 @@ pub(super) fn of(darks: &Darks, unread: usize) -> anyhow::Result<Page> {
         figures,
         tables,
         provenance: vec![page::options(), Fact::new("Full scale by", full_scale)],
-        ..Page::default()
+        ..PageContent::default()
     })
 }
 

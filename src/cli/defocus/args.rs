@@ -1,6 +1,6 @@
 //! The options of `defocus`.
 
-use crate::cli::options::format::Format;
+use crate::cli::options::format::OutputFormat;
 use crate::cli::options::scenario::ScenarioOptions;
 use crate::cli::options::steps::Steps;
 use crate::cli::options::threads::ThreadOptions;
@@ -72,8 +72,8 @@ pub(crate) struct DefocusArgs {
     #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = values::not_negative, allow_hyphen_values = true)]
     pub(super) focused_px: f64,
     /// What to print: csv has a row for each point of the grid
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(super) format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    pub(super) format: OutputFormat,
     /// Also write grid.csv, curve.csv, defocus.json, defocus.txt and figures into this directory
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,

@@ -2,13 +2,17 @@
 //! of the paper, its spots and its surface.
 
 use crate::cli::plot::{
-    Axis, BLACK, BLUE, Cell, ColorScale, Dot, FigureForm, Layer, Marks, ORANGE, Panel, Sheet,
-    WHITE, figure_files, two_digits,
+    Axis, BLACK, BLUE, ColorScale, Dot, FigureForm, FilledRectangle, Marks, ORANGE, Panel,
+    PlotLayer, Sheet, WHITE, figure_files, two_digits,
 };
 use plotters::style::RGBColor;
 use starpipe::base::format::five_digits;
-use starpipe::model::defocus::{ErrorCurve, ErrorPoint, Expected, IsoLine, PeakStudy, Surface};
-use starpipe::study::defocus::{DefocusReport, StarModel, StarReport, StarStudy, Theory};
+use starpipe::model::defocus::{
+    ErrorCurve, ErrorPoint, ExpectedError, IsoLine, PeakStudy, Surface,
+};
+use starpipe::study::defocus::{
+    DefocusReport, DefocusStar, DefocusStarReport, PredictedError, StarStudy,
+};
 
 /// Colors of a few lines that everybody can tell apart.
 const COLORS: [RGBColor; 4] = [BLUE, ORANGE, RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
@@ -92,7 +96,7 @@ fn title_of(study: &StarStudy, title: &str) -> String {
     }
 }
 
-fn label_of(star: &StarReport) -> String {
+fn label_of(star: &DefocusStarReport) -> String {
     star.vmag
         .map_or_else(String::new, |v_mag| format!("V {}", five_digits(v_mag)))
 }
@@ -103,18 +107,18 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     // A third along the outline the lines are farthest apart.
     let labels = line_labels(study, &lines, |line| line.len() / 3);
     let measured = |_, _, point: &ErrorPoint| point.is_sound().then_some(point.rms_px);
-    let mut layers = vec![Layer::colored(cells(study, measured), scale(study))];
+    let mut layers = vec![PlotLayer::colored(cells(study, measured), scale(study))];
     if study.star.v_mag().is_none() {
         let paper = study.isolines.iter();
         let paper = paper.map(|line| paper_line(study, line.rms_px)).collect();
-        layers.push(Layer::new(
+        layers.push(PlotLayer::new(
             "the paper's surface",
             ORANGE,
             Marks::Lines(paper),
         ));
     }
-    layers.push(Layer::unnamed(WHITE, Marks::Lines(lines)));
-    layers.push(Layer::unnamed(BLACK, labels));
+    layers.push(PlotLayer::unnamed(WHITE, Marks::Lines(lines)));
+    layers.push(PlotLayer::unnamed(BLACK, labels));
     Panel {
         title: title_of(study, "error of a centroid, with lines of equal error"),
         x: noise_axis(report),
@@ -168,7 +172,7 @@ fn paper_line(study: &StarStudy, rms_px: f64) -> Vec<(f64, f64)> {
 
 /// The paper's figures 1 and 3, and what its model of a spot costs where it is sampled.
 fn of_paper(report: &DefocusReport, study: &StarStudy) -> Vec<(&'static str, Sheet)> {
-    let StarModel::Peak(experiment) = &study.star else {
+    let DefocusStar::Peak(experiment) = &study.star else {
         return Vec::new();
     };
     let spots = PAPER_SPOTS_PX.map(|spot_px| spot(experiment, spot_px));
@@ -190,7 +194,7 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     let side = 2 * experiment.half_window_px + 1;
     let cell = |(number, value): (usize, &f64)| {
         let [column, row] = [number % side, number / side].map(|i| i as f64 - half);
-        Cell {
+        FilledRectangle {
             x: [column - 0.5, column + 0.5],
             y: [row - 0.5, row + 0.5],
             color: grey(value / experiment.peak),
@@ -207,7 +211,7 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
         title: format!("a spot of radius {} px", five_digits(spot_px)),
         x: Axis::of("column (px)"),
         y: Axis::of("row (px)"),
-        layers: vec![Layer::colored(cells, levels)],
+        layers: vec![PlotLayer::colored(cells, levels)],
     }
 }
 
@@ -224,7 +228,7 @@ fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surf
         title: format!("the fitted surface (eq. 13), {whose}"),
         x: noise_axis(report),
         y: radius_axis(report),
-        layers: vec![Layer::colored(cells(study, value), scale(study))],
+        layers: vec![PlotLayer::colored(cells(study, value), scale(study))],
     }
 }
 
@@ -232,7 +236,7 @@ fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surf
 fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
     let grid = &study.errors.grid;
     let count = grid.noises.len();
-    let line = |all: &[Expected], noise: usize| {
+    let line = |all: &[ExpectedError], noise: usize| {
         let column = all.iter().skip(noise).step_by(count);
         let points = grid.spots_px.iter().zip(column);
         Marks::Line(points.map(|(&spot_px, at)| (spot_px, at.rms_px)).collect())
@@ -240,9 +244,9 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
     let layers = a_few(count).flat_map(|(noise, color)| {
         let label = noise_label(report, grid.noises[noise]);
         let integrated = study.expected.as_ref();
-        let integrated = integrated.map(|all| Layer::new(label, color, line(all, noise)));
+        let integrated = integrated.map(|all| PlotLayer::new(label, color, line(all, noise)));
         let sampled = study.sampled.as_ref();
-        let sampled = sampled.map(|all| Layer::guide(line(all, noise)));
+        let sampled = sampled.map(|all| PlotLayer::guide(line(all, noise)));
         sampled.into_iter().chain(integrated)
     });
     Panel {
@@ -274,11 +278,14 @@ fn scale(study: &StarStudy) -> ColorScale {
 
 /// The grid as cells, with the colors of the errors that `error_px` gives; those beside each other
 /// with one shade are one cell.
-fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>) -> Vec<Cell> {
+fn cells(
+    study: &StarStudy,
+    error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>,
+) -> Vec<FilledRectangle> {
     let grid = &study.errors.grid;
     let [least, most] = color_range_px(study);
     let (columns, rows) = (edges(&grid.noises), edges(&grid.spots_px));
-    let mut cells: Vec<Cell> = Vec::new();
+    let mut cells: Vec<FilledRectangle> = Vec::new();
     for (row, points) in study.errors.points.chunks(grid.noises.len()).enumerate() {
         let mut last_shade = None;
         for (column, point) in points.iter().enumerate() {
@@ -290,7 +297,7 @@ fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f
                 (Some(cell), Some(_)) if column > 0 && shade == last_shade => {
                     cell.x[1] = columns[column + 1];
                 }
-                (_, Some(shade)) => cells.push(Cell {
+                (_, Some(shade)) => cells.push(FilledRectangle {
                     x: [columns[column], columns[column + 1]],
                     y: [rows[row], rows[row + 1]],
                     color: color_of(shade / SHADES),
@@ -362,33 +369,33 @@ fn at(curve: &ErrorCurve, radius: f64) -> Option<f64> {
     (first..=last).contains(&radius).then(|| curve.at(radius))
 }
 
-fn over_radius(report: &DefocusReport, study: &StarStudy) -> Vec<Layer> {
+fn over_radius(report: &DefocusReport, study: &StarStudy) -> Vec<PlotLayer> {
     let grid = &study.errors.grid;
     let section = |(noise, color): (usize, RGBColor)| {
         let curve = study.curves[noise].as_ref()?;
         let radii = grid.spots_px.iter();
         let line = radii.filter_map(|&radius| Some((radius, at(curve, radius)?)));
         let label = noise_label(report, grid.noises[noise]);
-        Some(Layer::new(label, color, Marks::Line(line.collect())))
+        Some(PlotLayer::new(label, color, Marks::Line(line.collect())))
     };
-    let mut layers: Vec<Layer> = a_few(grid.noises.len()).filter_map(section).collect();
+    let mut layers: Vec<PlotLayer> = a_few(grid.noises.len()).filter_map(section).collect();
     let theory = study.points.iter().map(|at| match &at.theory {
-        Theory::Expected(expected) => (at.spot_px, expected.rms_px),
-        Theory::Reach(reach) => (at.spot_px, reach.bound_px),
+        PredictedError::Expected(expected) => (at.spot_px, expected.rms_px),
+        PredictedError::Reach(reach) => (at.spot_px, reach.bound_px),
     });
-    layers.push(Layer::guide(Marks::Line(theory.collect())));
-    layers.push(Layer::unnamed(BLACK, Marks::Dots(dots(study))));
+    layers.push(PlotLayer::guide(Marks::Line(theory.collect())));
+    layers.push(PlotLayer::unnamed(BLACK, Marks::Dots(dots(study))));
     layers
 }
 
-fn over_noise(study: &StarStudy) -> Vec<Layer> {
+fn over_noise(study: &StarStudy) -> Vec<PlotLayer> {
     let grid = &study.errors.grid;
     let section = |(number, color): (usize, RGBColor)| {
         let radius = grid.spots_px[number];
         let curves = grid.noises.iter().zip(&study.curves);
         let line = curves.filter_map(|(&noise, curve)| Some((noise, at(curve.as_ref()?, radius)?)));
         let label = format!("{} px", five_digits(two_digits(radius)));
-        Layer::new(label, color, Marks::Line(line.collect()))
+        PlotLayer::new(label, color, Marks::Line(line.collect()))
     };
     a_few(grid.spots_px.len()).map(section).collect()
 }
@@ -408,7 +415,7 @@ fn dots(study: &StarStudy) -> Vec<Dot> {
 }
 
 /// The best radius at each noise, and the radii between which the error is at most 5 % larger.
-fn best_of(star: &StarReport) -> Marks {
+fn best_of(star: &DefocusStarReport) -> Marks {
     let best = star.best_by_noise.iter().filter_map(|at| {
         let best = at.best?;
         Some((at.noise, best.spot_px, best.nearly_px))
@@ -419,7 +426,7 @@ fn best_of(star: &StarReport) -> Marks {
 /// The best radius of each star over the noise.
 fn best_radii(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLORS);
-    let layers = stars.map(|(star, color)| Layer::new(label_of(star), color, best_of(star)));
+    let layers = stars.map(|(star, color)| PlotLayer::new(label_of(star), color, best_of(star)));
     Panel {
         title: "Best radius, and those whose error is at most 5 % larger".to_owned(),
         x: noise_axis(report),
@@ -429,7 +436,7 @@ fn best_radii(report: &DefocusReport) -> Panel {
 }
 
 /// The best radius and the smallest that meets each error, over the noise.
-fn radii_for_errors(report: &DefocusReport, star: &StarReport, study: &StarStudy) -> Panel {
+fn radii_for_errors(report: &DefocusReport, star: &DefocusStarReport, study: &StarStudy) -> Panel {
     let lines: Vec<_> = study.isolines.iter().map(smallest_radii).collect();
     let parabolas = study.isolines.iter().zip(&lines);
     let parabolas = parabolas.filter_map(|(level, line)| {
@@ -444,10 +451,10 @@ fn radii_for_errors(report: &DefocusReport, star: &StarReport, study: &StarStudy
         x: noise_axis(report),
         y: radius_axis(report),
         layers: vec![
-            Layer::new("best, to 5 % of its error", BLUE, best_of(star)),
-            Layer::new("parabolas", RGBColor(150, 150, 150), parabolas),
-            Layer::new("smallest for an error (px)", ORANGE, Marks::Lines(lines)),
-            Layer::unnamed(BLACK, labels),
+            PlotLayer::new("best, to 5 % of its error", BLUE, best_of(star)),
+            PlotLayer::new("parabolas", RGBColor(150, 150, 150), parabolas),
+            PlotLayer::new("smallest for an error (px)", ORANGE, Marks::Lines(lines)),
+            PlotLayer::unnamed(BLACK, labels),
         ],
     }
 }
@@ -465,7 +472,7 @@ fn accuracy_and_reach(report: &DefocusReport) -> Panel {
     }
 }
 
-fn accuracy_of(star: &StarReport, color: RGBColor) -> [Layer; 3] {
+fn accuracy_of(star: &DefocusStarReport, color: RGBColor) -> [PlotLayer; 3] {
     const LABELLED_PX: [f64; 6] = [0.3, 0.5, 0.7, 1.0, 1.5, 2.0];
     let bound = star
         .curve
@@ -487,8 +494,8 @@ fn accuracy_of(star: &StarReport, color: RGBColor) -> [Layer; 3] {
     let labels = Marks::Texts(labels.collect());
     let line = points.iter().map(|(_, point)| *point).collect();
     [
-        Layer::guide(Marks::Line(bound.collect())),
-        Layer::new(label_of(star), color, Marks::Line(line)),
-        Layer::unnamed(color, labels),
+        PlotLayer::guide(Marks::Line(bound.collect())),
+        PlotLayer::new(label_of(star), color, Marks::Line(line)),
+        PlotLayer::unnamed(color, labels),
     ]
 }

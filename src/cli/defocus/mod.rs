@@ -9,20 +9,20 @@ mod tables;
 
 pub(crate) use args::DefocusArgs;
 
-use super::exit::{CommandError, Exit, Outcome};
-use super::options::format::Format;
+use super::exit::{CommandError, CommandOutput, Exit};
+use super::options::format::OutputFormat;
 use super::output::files::{made, write_each, write_into};
 use super::output::messages::report_warning;
 use super::output::rows::{json_indented, json_line};
 use super::progress::bar;
 use starpipe::Interrupt;
-use starpipe::model::defocus::Lens;
-use starpipe::study::defocus::{Caller, DefocusReport, Plan, StarStudy};
+use starpipe::model::defocus::DefocusLens;
+use starpipe::study::defocus::{Caller, DefocusPlan, DefocusReport, StarStudy};
 use std::path::PathBuf;
 use tables::{curve_table, grid_table};
 
 /// `starpipe defocus`
-pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<CommandOutput, CommandError> {
     let pool = arguments.threads.pool()?;
     let page_path = page_path(arguments)?;
     let plan = plan::plan(arguments, &pool)?;
@@ -45,16 +45,16 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<Outcome, CommandError> 
     });
     let all_written = write_each(page) && results;
     let text = match arguments.format {
-        Format::Text => report.to_text(),
-        Format::Json => json_line(&report)?,
-        Format::Csv => grid_table(&studies)?,
+        OutputFormat::Text => report.to_text(),
+        OutputFormat::Json => json_line(&report)?,
+        OutputFormat::Csv => grid_table(&studies)?,
     };
     let exit = if report.is_met() {
         Exit::Success
     } else {
         Exit::Unmet
     };
-    Ok(Outcome { text, exit }.if_written(all_written))
+    Ok(CommandOutput { text, exit }.if_written(all_written))
 }
 
 /// The file of the page, if there is to be one.
@@ -66,7 +66,7 @@ fn page_path(arguments: &DefocusArgs) -> Result<Option<PathBuf>, CommandError> {
     arguments.html.checked_path(&inputs, default)
 }
 
-fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> {
+fn run(plan: &DefocusPlan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> {
     let progress = bar(
         plan.point_count() as u64,
         "radii and noises {wide_bar} {pos}/{len} {eta}",
@@ -82,7 +82,7 @@ fn run(plan: &Plan, pool: &rayon::ThreadPool) -> anyhow::Result<Vec<StarStudy>> 
 
 /// No lens makes a spot that is sharper than diffraction: a warning for each star with such a best spot.
 fn too_sharp(report: &DefocusReport) -> Vec<String> {
-    let Some(least_px) = report.lens.as_ref().map(Lens::diffraction_px) else {
+    let Some(least_px) = report.lens.as_ref().map(DefocusLens::diffraction_px) else {
         return Vec::new();
     };
     let best = report.stars.iter().map(|star| star.best.radius.radius_px);

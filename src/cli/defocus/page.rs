@@ -5,8 +5,8 @@ use super::tables::curve_table;
 use super::{figures, plan};
 use crate::cli::page::{figure, options, table};
 use starpipe::base::format::five_digits;
-use starpipe::report::page::{Fact, Page, PageFigure};
-use starpipe::study::defocus::{DefocusReport, StarReport, StarStudy};
+use starpipe::report::page::{Fact, PageContent, PageFigure};
+use starpipe::study::defocus::{DefocusReport, DefocusStarReport, StarStudy};
 
 /// The page of the results; `notes` are what was warned of.
 pub(super) fn of(
@@ -14,12 +14,12 @@ pub(super) fn of(
     report: &DefocusReport,
     studies: &[StarStudy],
     mut notes: Vec<String>,
-) -> anyhow::Result<Page> {
+) -> anyhow::Result<PageContent> {
     let stars = &report.stars;
     if let (
         [],
         [
-            StarReport {
+            DefocusStarReport {
                 vmag: Some(v_mag), ..
             },
         ],
@@ -39,7 +39,7 @@ pub(super) fn of(
         .iter()
         .map(|(name, sheet)| figure(sheet, caption(name)))
         .collect::<anyhow::Result<_>>()?;
-    Ok(Page {
+    Ok(PageContent {
         title: "Radius of the spot for the best centroids".to_owned(),
         question: format!(
             "At which radius of the spot is the error of a centroid least? {} radii from {} to {} px.",
@@ -58,16 +58,16 @@ pub(super) fn of(
             Fact::new("Seed", report.seed.to_string()),
             Fact::new("Assumed", assumed.join("; ")),
         ],
-        ..Page::default()
+        ..PageContent::default()
     })
 }
 
-fn name_of(star: &StarReport) -> String {
+fn name_of(star: &DefocusStarReport) -> String {
     star.vmag
         .map_or_else(String::new, |v_mag| format!("V {}: ", five_digits(v_mag)))
 }
 
-fn answer(star: &StarReport) -> String {
+fn answer(star: &DefocusStarReport) -> String {
     let [from, to] = star.best.nearly_px;
     format!(
         "{}{:.2} px, where the error is {:.4} px. From {from:.2} to {to:.2} px it is at most 5 % more.",
@@ -77,7 +77,7 @@ fn answer(star: &StarReport) -> String {
     )
 }
 
-fn facts(report: &DefocusReport, star: &StarReport) -> Vec<Fact> {
+fn facts(report: &DefocusReport, star: &DefocusStarReport) -> Vec<Fact> {
     let lines = report.radii_lines(star).into_iter();
     lines
         .map(|(name, value)| Fact::new(format!("{}{name}", name_of(star)), value))

@@ -5,10 +5,10 @@ use super::darks::dark_noise;
 use crate::cli::exit::CommandError;
 use crate::cli::output::messages::report_warning;
 use anyhow::{Error, anyhow};
-use starpipe::model::defocus::{Centroiding, EnergyStudy, Grid, Lens, PeakStudy};
+use starpipe::model::defocus::{Centroiding, DefocusLens, EnergyStudy, PeakStudy, SpotNoiseGrid};
 use starpipe::model::sensitivity::Scenario;
 use starpipe::study::defocus::{
-    BRIGHTER_THAN_LIMIT_MAG, DarkNoise, DefocusError, Noise, NoiseError, Plan, StarModel,
+    BRIGHTER_THAN_LIMIT_MAG, DarkNoise, DefocusError, DefocusPlan, DefocusStar, Noise, NoiseError,
     default_v_mag,
 };
 
@@ -16,7 +16,7 @@ use starpipe::study::defocus::{
 pub(super) fn plan(
     arguments: &DefocusArgs,
     pool: &rayon::ThreadPool,
-) -> Result<Plan, CommandError> {
+) -> Result<DefocusPlan, CommandError> {
     let options = &arguments.scenario;
     let has_camera = options.camera.is_some() || options.preset.is_some();
     let normalisation = arguments.normalisation.unwrap_or(match has_camera {
@@ -33,13 +33,13 @@ pub(super) fn plan(
         paths => Some(dark_noise(paths, scenario.as_ref(), pool)?),
     };
     let sheet = scenario.as_ref().map(|scenario| &scenario.camera);
-    let lens = sheet.map(|sheet| Lens::of(sheet, arguments.focused_px));
+    let lens = sheet.map(|sheet| DefocusLens::of(sheet, arguments.focused_px));
     let present_px = sheet.map(|sheet| sheet.spot_sigma_px);
     let (stars, grid, noise) = match (normalisation, scenario) {
         (Normalisation::Energy, Some(scenario)) => energy(arguments, scenario, darks)?,
         _ => peak(arguments, darks)?,
     };
-    Ok(Plan {
+    Ok(DefocusPlan {
         stars,
         grid,
         noise,
@@ -54,15 +54,15 @@ pub(super) fn plan(
 fn peak(
     arguments: &DefocusArgs,
     darks: Option<DarkNoise>,
-) -> Result<(Vec<StarModel>, Grid, Noise), Error> {
+) -> Result<(Vec<DefocusStar>, SpotNoiseGrid, Noise), Error> {
     let default = PeakStudy::default();
     let star = PeakStudy {
         peak: arguments.peak.unwrap_or(default.peak),
         half_window_px: arguments.half_window_px.into(),
         trials: arguments.count.map_or(default.trials, |n| n as usize),
     };
-    let default = Grid::of_paper();
-    let grid = Grid {
+    let default = SpotNoiseGrid::of_paper();
+    let grid = SpotNoiseGrid {
         spots_px: arguments
             .radius_px
             .clone()
@@ -77,7 +77,7 @@ fn peak(
         (None, Some(relative)) => Noise::of_relative(relative, "--at-noise"),
         (None, None) => Noise::of_paper(),
     };
-    Ok((vec![StarModel::Peak(star)], grid, noise))
+    Ok((vec![DefocusStar::Peak(star)], grid, noise))
 }
 
 /// Stars, grid and noise of a camera.
@@ -85,7 +85,7 @@ fn energy(
     arguments: &DefocusArgs,
     scenario: Scenario,
     darks: Option<DarkNoise>,
-) -> Result<(Vec<StarModel>, Grid, Noise), Error> {
+) -> Result<(Vec<DefocusStar>, SpotNoiseGrid, Noise), Error> {
     let noise = match darks {
         Some(darks) => Noise::of_good_pixels(darks, &scenario),
         None => Noise::of_camera(&scenario),
@@ -103,10 +103,10 @@ fn energy(
             .centroid
             .map_or(star.centroiding, Centroiding::from);
         star.trials = arguments.count.map_or(star.trials, |n| n as usize);
-        StarModel::Energy(Box::new(star))
+        DefocusStar::Energy(Box::new(star))
     };
-    let default = Grid::around(noise.value());
-    let grid = Grid {
+    let default = SpotNoiseGrid::around(noise.value());
+    let grid = SpotNoiseGrid {
         spots_px: arguments
             .radius_px
             .clone()

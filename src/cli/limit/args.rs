@@ -1,6 +1,6 @@
 //! The options of `limit`.
 
-use crate::cli::options::format::Format;
+use crate::cli::options::format::OutputFormat;
 use crate::cli::options::scenario::ScenarioOptions;
 use crate::cli::options::steps::named_steps;
 use crate::cli::page::HtmlOption;
@@ -34,8 +34,8 @@ pub(crate) struct LimitArgs {
     )]
     pub(crate) sweep: Vec<LimitSweep>,
     /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(crate) format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    pub(crate) format: OutputFormat,
     /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times
     /// the exposure (in a sweep over the exposure: for half the aperture)
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser(), requires = "sweep")]

@@ -1,11 +1,13 @@
 //! The limiting magnitude over one parameter: a panel for each sweep, or the paper's figures.
 
 use crate::cli::exit::CommandError;
-use crate::cli::plot::{Axis, BLACK, BLUE, Figure as _, Form, Layer, Marks, ORANGE, Panel, Sheet};
+use crate::cli::plot::{
+    Axis, BLACK, BLUE, Figure as _, Form, Marks, ORANGE, Panel, PlotLayer, Sheet,
+};
 use anyhow::Context;
 use starpipe::base::format::five_digits;
 use starpipe::model::sensitivity::{
-    Budget, Curve, Figure, Scenario, Series, Spacing, Sweep, curves,
+    Budget, CurveValues, PaperFigure, Scenario, Spacing, Sweep, SweepCurve, curves,
 };
 
 /// Sweeps side by side.
@@ -19,7 +21,7 @@ pub(super) fn of_sweeps<'a>(
     scenario: &Scenario,
 ) -> Result<Sheet, CommandError> {
     let panel = |sweep: &Sweep| {
-        let series = Series::around(scenario, sweep.parameter);
+        let series = CurveValues::around(scenario, sweep.parameter);
         let curves = curves(scenario, sweep, &series).map_err(CommandError::usage)?;
         Ok(panel(String::new(), sweep, curves, scenario))
     };
@@ -30,7 +32,7 @@ pub(super) fn of_sweeps<'a>(
 /// Names and contents of the files with the eleven figures, and with a sheet of all of them.
 pub(super) fn of_paper(scenario: &Scenario) -> Result<Vec<(String, Vec<u8>)>, CommandError> {
     let mut panels = Vec::new();
-    for figure in Figure::ALL {
+    for figure in PaperFigure::ALL {
         let sweep = figure.sweep().map_err(anyhow::Error::from)?;
         let curves = figure
             .curves(scenario, &sweep)
@@ -38,7 +40,7 @@ pub(super) fn of_paper(scenario: &Scenario) -> Result<Vec<(String, Vec<u8>)>, Co
         let title = format!("{}  {}", figure.id, figure.title);
         panels.push(panel(title, &sweep, curves, scenario));
     }
-    let sheets = Figure::ALL.iter().zip(&panels);
+    let sheets = PaperFigure::ALL.iter().zip(&panels);
     let mut sheets: Vec<(String, Sheet)> = sheets
         .map(|(figure, panel)| (figure.file_stem(), Sheet::of_one(panel.clone())))
         .collect();
@@ -53,17 +55,17 @@ pub(super) fn of_paper(scenario: &Scenario) -> Result<Vec<(String, Vec<u8>)>, Co
 }
 
 /// Curves over one parameter, and a dot for the scenario itself.
-fn panel(title: String, sweep: &Sweep, curves: Vec<Curve>, scenario: &Scenario) -> Panel {
+fn panel(title: String, sweep: &Sweep, curves: Vec<SweepCurve>, scenario: &Scenario) -> Panel {
     let (first, last) = (sweep.values[0], sweep.values[sweep.values.len() - 1]);
     let value = sweep.parameter.get(scenario);
     let dot = value
         .filter(|value| (first..=last).contains(value))
         .map(|value| (value, Budget::new(scenario).limit_vmag));
     let curves = curves.into_iter().zip([BLUE, ORANGE]);
-    let mut layers: Vec<Layer> = curves
-        .map(|(curve, color)| Layer::new(curve.label, color, Marks::Line(curve.points)))
+    let mut layers: Vec<PlotLayer> = curves
+        .map(|(curve, color)| PlotLayer::new(curve.label, color, Marks::Line(curve.points)))
         .collect();
-    layers.extend(dot.map(|dot| Layer::new("this camera", BLACK, Marks::Points(vec![dot]))));
+    layers.extend(dot.map(|dot| PlotLayer::new("this camera", BLACK, Marks::Points(vec![dot]))));
     Panel {
         title,
         x: Axis::log(sweep.parameter.title(), sweep.spacing == Spacing::Log).within(first, last),

@@ -7,8 +7,8 @@ mod rows;
 
 pub(crate) use args::LimitArgs;
 
-use super::exit::{CommandError, Outcome};
-use super::options::format::Format;
+use super::exit::{CommandError, CommandOutput};
+use super::options::format::OutputFormat;
 use super::output::files::{write_each, write_into};
 use super::output::overwrite::is_same_file;
 use super::output::rows::{csv_table, json_lines};
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 const MAX_SWEEPS: usize = 64;
 
 /// `starpipe limit`
-pub(crate) fn limit(arguments: &LimitArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn limit(arguments: &LimitArgs) -> Result<CommandOutput, CommandError> {
     let sweeps = arguments.sweep.len();
     if sweeps > MAX_SWEEPS {
         return Err(CommandError::Usage(format!(
@@ -48,10 +48,10 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<Outcome, CommandError> {
         crate::cli::page::file(&path, &page)
     });
     let all_written = write_each(plot.into_iter().chain(page));
-    let outcome = Outcome::success(match arguments.format {
-        Format::Text => PredictionRow::to_text(&rows),
-        Format::Json => json_lines(rows.iter())?,
-        Format::Csv => csv_table(rows.iter().map(PredictionRow::table_row))?,
+    let outcome = CommandOutput::success(match arguments.format {
+        OutputFormat::Text => PredictionRow::to_text(&rows),
+        OutputFormat::Json => json_lines(rows.iter())?,
+        OutputFormat::Csv => csv_table(rows.iter().map(PredictionRow::table_row))?,
     });
     Ok(outcome.if_written(all_written))
 }
@@ -78,12 +78,12 @@ fn check_plot(arguments: &LimitArgs) -> Result<(), CommandError> {
 }
 
 /// Writes the eleven figures of the paper and a sheet of all of them.
-fn paper_figures(directory: &Path, scenario: &Scenario) -> Result<Outcome, CommandError> {
+fn paper_figures(directory: &Path, scenario: &Scenario) -> Result<CommandOutput, CommandError> {
     let files = figures::of_paper(scenario)?;
     let lines = files
         .iter()
         .map(|(name, _)| format!("{}\n", directory.join(name).display()));
-    let outcome = Outcome::success(lines.collect());
+    let outcome = CommandOutput::success(lines.collect());
     let all_written = write_into(directory, files.into_iter().map(Ok));
     Ok(outcome.if_written(all_written))
 }

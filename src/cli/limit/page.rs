@@ -8,7 +8,7 @@ use crate::cli::page::{catalog, figure, options, table};
 use starpipe::base::format::five_digits;
 use starpipe::catalog::Catalog;
 use starpipe::model::sensitivity::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
-use starpipe::report::page::{Fact, Page};
+use starpipe::report::page::{Fact, PageContent};
 
 const PAPER: &str =
     "The equations are used as the paper's authors did. --reading physical corrects the physics.";
@@ -23,10 +23,10 @@ pub(super) fn of(
     rows: &[PredictionRow],
     arguments: &LimitArgs,
     scenario: &Scenario,
-) -> anyhow::Result<Page> {
+) -> anyhow::Result<PageContent> {
     let camera = &scenario.camera.name;
     let of_scenario = PredictionRow::new(scenario, arguments.scenario.preset, Catalog::built_in());
-    let mut page = Page {
+    let mut page = PageContent {
         title: format!("Limiting magnitude of {camera}"),
         question: question(scenario),
         text: PredictionRow::to_text(rows),
@@ -36,7 +36,7 @@ pub(super) fn of(
             Fact::new("Camera", camera.clone()),
             Fact::new("Equations", scenario.reading.words()),
         ],
-        ..Page::default()
+        ..PageContent::default()
     };
     if scenario.reading == Reading::Paper {
         page.notes.push(PAPER.to_owned());

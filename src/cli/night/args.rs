@@ -8,7 +8,7 @@ use crate::cli::options::format::PageFormat;
 use crate::cli::options::frames::MemoryOption;
 use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
-use crate::cli::solving::Plan;
+use crate::cli::solving::SolvingPlan;
 use clap::Args;
 use starpipe::calibration::Calibration;
 use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
@@ -90,7 +90,7 @@ impl NightArgs {
     }
 
     /// What the frames are solved with.
-    pub(super) fn plan(&self) -> Result<Plan, CommandError> {
+    pub(super) fn plan(&self) -> Result<SolvingPlan, CommandError> {
         if self.hints.date.is_some() {
             return Err(CommandError::usage(
                 "--date is one date for all frames; those of a night have their own, in their headers or in \
@@ -103,7 +103,7 @@ impl NightArgs {
         options.trails = true;
         options.exposure_s = self.exposure;
         options.time_limit_s = Some(self.time_limit_s);
-        Ok(Plan {
+        Ok(SolvingPlan {
             options,
             calibration: self.calibration.read(camera.as_ref())?,
             camera,

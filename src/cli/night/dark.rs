@@ -1,13 +1,13 @@
 //! The level of a pixel without light, by the frames of a night.
 
 use super::read::of_each;
-use super::run::Run;
+use super::run::NightRun;
 use starpipe::frame::Frame;
 use starpipe::night::{FrameLevel, NightStart, dark_level, is_by_day};
 use starpipe::sky::DarkLevel;
 
 /// The level by frames of different exposure, where nothing else tells it.
-pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<DarkLevel> {
+pub(super) fn learn(run: &NightRun, names: &[String], start: &NightStart) -> Option<DarkLevel> {
     if !start.lacks_dark_level {
         return None;
     }

@@ -1,15 +1,21 @@
 //! Hot pixels of a night.
 
 use super::read::of_each;
-use super::run::Run;
+use super::run::NightRun;
 use crate::cli::output::rows::csv_table;
-use starpipe::night::{NightHotPixel, NightStart, Standouts, hot_pixels, is_by_day, probe_order};
+use starpipe::night::{
+    NightHotPixel, NightStart, OutlierPixels, hot_pixels, is_by_day, probe_order,
+};
 
 /// Frames that are looked at.
 const FRAMES: usize = 12;
 
 /// The hot pixels that frames all over the night show; `None` where too few can be read.
-pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<Vec<NightHotPixel>> {
+pub(super) fn learn(
+    run: &NightRun,
+    names: &[String],
+    start: &NightStart,
+) -> Option<Vec<NightHotPixel>> {
     let order = probe_order(names.len());
     let chosen: Vec<&String> = order.iter().take(FRAMES).map(|at| &names[*at]).collect();
     let standouts = of_each(&chosen, run.pool, run.plan.memory, |_, frame| {
@@ -18,9 +24,9 @@ pub(super) fn learn(run: &Run, names: &[String], start: &NightStart) -> Option<V
             return None;
         }
         let mjd = date.and_then(|date| date.modified_julian_date());
-        Some(Standouts::of(&frame.into_stored(), mjd))
+        Some(OutlierPixels::of(&frame.into_stored(), mjd))
     });
-    let found: Vec<Standouts> = standouts.into_iter().flatten().collect();
+    let found: Vec<OutlierPixels> = standouts.into_iter().flatten().collect();
     hot_pixels(&found, start.held.as_ref(), start.site)
 }
 

@@ -13,15 +13,15 @@ mod text;
 
 pub(crate) use args::NightArgs;
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::names::frame_names;
 use super::options::format::PageFormat;
 use super::output::files::{make_directory, write_each};
 use super::output::journal::{Journal, has_row_of};
 use super::output::messages::report_mended;
 use super::output::rows::json_line;
-use super::solving::Plan;
-use run::{BATCH, Measured, Run};
+use super::solving::SolvingPlan;
+use run::{BATCH, MeasuredNight, NightRun};
 use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::catalog::Catalog;
 use starpipe::frame::Cameras;
@@ -32,7 +32,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 /// `starpipe night`
-pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn night(arguments: &NightArgs) -> Result<CommandOutput, CommandError> {
     let plan = arguments.plan()?;
     let (names, mut passed_over) = frame_names(&arguments.frames, Cameras::OneNight)?;
     passed_over.retain(|file| !is_own_result(&arguments.out, &file.path));
@@ -42,7 +42,7 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<Outcome, CommandError> {
         let owner = claim(arguments, &plan, &names, indexed.catalog())?;
         let (journal, kept) =
             Journal::open(&arguments.out.join(files::ROWS), owner.text(), &names)?;
-        let run = Run {
+        let run = NightRun {
             pool,
             plan: &plan,
             context: plan.context(indexed),
@@ -90,7 +90,7 @@ fn is_own_result(out: &Path, path: &Path) -> bool {
 /// Takes the directory for this run, or goes on in it. Returns whose it is.
 fn claim(
     arguments: &NightArgs,
-    plan: &Plan,
+    plan: &SolvingPlan,
     names: &[String],
     catalog: &Catalog,
 ) -> Result<Identity, CommandError> {
@@ -128,7 +128,7 @@ fn is_own(directory: &Path, identity: &Identity) -> bool {
 /// All that the rows depend on.
 fn configuration(
     arguments: &NightArgs,
-    plan: &Plan,
+    plan: &SolvingPlan,
     catalog: &Catalog,
 ) -> anyhow::Result<Configuration> {
     let NightArgs {
@@ -145,10 +145,10 @@ fn configuration(
 /// Writes the files of a night, and says what it was.
 fn finish(
     arguments: &NightArgs,
-    measured: &Measured,
+    measured: &MeasuredNight,
     beside: Beside,
-) -> Result<Outcome, CommandError> {
-    let Measured {
+) -> Result<CommandOutput, CommandError> {
+    let MeasuredNight {
         rows,
         history,
         start,
@@ -190,5 +190,5 @@ fn finish(
         None | Some(PageFormat::Text) => text::text(&night),
         Some(PageFormat::Json) => json_line(&night)?,
     };
-    Ok(Outcome { text, exit }.if_written(all_written))
+    Ok(CommandOutput { text, exit }.if_written(all_written))
 }

@@ -4,10 +4,14 @@ use super::text;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{options, table};
 use starpipe::night::{self, Moment, NightRow, NightSummary};
-use starpipe::report::page::{Fact, Page, PageFigure};
+use starpipe::report::page::{Fact, PageContent, PageFigure};
 
 /// The page of the frames of a night; `csv` is their table.
-pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow::Result<Page> {
+pub(super) fn of(
+    rows: &[NightRow],
+    summary: &NightSummary,
+    csv: &str,
+) -> anyhow::Result<PageContent> {
     let figure = night::svg(rows, summary).map(|svg| PageFigure {
         caption: "The night: a frame's values are shown where the pointer is".to_owned(),
         svg,
@@ -20,7 +24,7 @@ pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow
         tables.push(table("What changed", &csv_table(moments)?)?);
     }
     tables.push(table("Frames", csv)?);
-    Ok(Page {
+    Ok(PageContent {
         title: match summary.first_date.as_str() {
             "" => "A night".to_owned(),
             date => format!("Night of {date}"),
@@ -34,7 +38,7 @@ pub(super) fn of(rows: &[NightRow], summary: &NightSummary, csv: &str) -> anyhow
         figures: figure.into_iter().collect(),
         tables,
         provenance: vec![options()],
-        ..Page::default()
+        ..PageContent::default()
     })
 }
 

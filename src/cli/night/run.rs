@@ -4,13 +4,13 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
-use crate::cli::solving::{Inputs, Plan, Sink, Solved, Solver};
+use crate::cli::solving::{InputSolver, Inputs, Sink, SolvedImage, SolvingPlan};
 use indicatif::ProgressBar;
 use starpipe::UtcOffset;
 use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::night::{NightRow, NightStart, NoSky, PointingHistory, Probe, probe_order};
-use starpipe::pipeline::{Context, HeldCamera};
+use starpipe::pipeline::{Context, FixedCamera};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -24,21 +24,21 @@ impl JournalRow for NightRow {
 }
 
 /// What a night is measured with.
-pub(super) struct Run<'a> {
+pub(super) struct NightRun<'a> {
     pub(super) pool: &'a rayon::ThreadPool,
-    pub(super) plan: &'a Plan,
+    pub(super) plan: &'a SolvingPlan,
     pub(super) context: Context<'a>,
     pub(super) is_quiet: bool,
 }
 
 /// The rows of a night, and what was held.
-pub(super) struct Measured {
+pub(super) struct MeasuredNight {
     pub(super) rows: Vec<NightRow>,
     pub(super) history: PointingHistory,
     pub(super) start: NightStart,
 }
 
-impl<'a> Run<'a> {
+impl<'a> NightRun<'a> {
     /// The same with another calibration, if there is one.
     pub(super) fn with_calibration(self, calibration: Option<&'a Calibration>) -> Self {
         let mut context = self.context;
@@ -53,9 +53,9 @@ impl<'a> Run<'a> {
         start: NightStart,
         mut journal: Journal,
         mut kept: Vec<Option<NightRow>>,
-    ) -> Result<Measured, CommandError> {
+    ) -> Result<MeasuredNight, CommandError> {
         let progress = self.bar(names.len());
-        let mut measured = Measured {
+        let mut measured = MeasuredNight {
             history: PointingHistory::new(start.held.as_ref().map(|held| held.pointing)),
             rows: Vec::with_capacity(names.len()),
             start,
@@ -118,7 +118,7 @@ impl<'a> Run<'a> {
     fn batch(
         &self,
         names: &[&String],
-        measured: &Measured,
+        measured: &MeasuredNight,
         progress: &ProgressBar,
     ) -> Vec<NightRow> {
         let mut context = self.context.clone();
@@ -127,7 +127,7 @@ impl<'a> Run<'a> {
             context.utc_offset = Some(UtcOffset::Ahead(ahead));
         }
         context.held = measured.held().map(Arc::new);
-        let rows = Rows {
+        let rows = NightRowSink {
             clear_ground_vmag: measured.start.clear_ground_vmag,
         };
         let mut all = Vec::with_capacity(names.len());
@@ -144,9 +144,9 @@ impl<'a> Run<'a> {
         all
     }
 
-    fn solver<'s, S>(&'s self, context: Context<'s>, sink: S) -> Solver<'s, S> {
+    fn solver<'s, S>(&'s self, context: Context<'s>, sink: S) -> InputSolver<'s, S> {
         const MAIN: &Inputs = &Inputs::Frames(PageChoice::Main);
-        Solver {
+        InputSolver {
             pool: self.pool,
             inputs: MAIN,
             context,
@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
     }
 }
 
-impl Measured {
+impl MeasuredNight {
     /// Takes the next row, and says by how much the camera differs from how it is held.
     fn take(&mut self, mut row: NightRow) {
         if let Some(shift_rad) = self.history.take_row(self.rows.len(), &row) {
@@ -166,10 +166,10 @@ impl Measured {
     }
 
     /// The camera as it is held now.
-    fn held(&self) -> Option<HeldCamera> {
+    fn held(&self) -> Option<FixedCamera> {
         let held = self.start.held.clone()?;
         let (pointing, sigma_rad) = self.history.held()?;
-        Some(HeldCamera {
+        Some(FixedCamera {
             pointing,
             sigma_rad,
             ..held
@@ -183,20 +183,20 @@ struct Probes;
 impl Sink for Probes {
     type Made = Option<Probe>;
 
-    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
         Probe::of(&image.to_string(), &solved.solution)
     }
 }
 
 /// Makes of a frame its row.
-struct Rows {
+struct NightRowSink {
     clear_ground_vmag: Option<f64>,
 }
 
-impl Sink for Rows {
+impl Sink for NightRowSink {
     type Made = NightRow;
 
-    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
         let (name, solution) = (image.to_string(), &solved.solution);
         let frame = solved.frame.as_ref();
         match frame.and_then(|frame| NoSky::of(&image.to_path(), solution, frame)) {

@@ -116,14 +116,14 @@ pub(super) fn answer(night: &NightSummary) -> String {
 }
 
 /// The median of a series, as it is shown.
-pub(super) struct Shown {
+pub(super) struct ShownMedian {
     pub(super) name: &'static str,
     /// With its unit.
     pub(super) value: String,
 }
 
 /// The medians that there are.
-pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = Shown> {
+pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = ShownMedian> {
     let of = &night.median;
     let cloud_percent = of.cloud_share.map(|share| 100.0 * share);
     let extinction = of.extinction_mag_per_airmass;
@@ -140,7 +140,7 @@ pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = Shown> {
     ];
     let shown = |(name, value, unit): (&'static str, Option<f64>, &str)| {
         let value = format!("{:.2} {unit}", value?);
-        Some(Shown { name, value })
+        Some(ShownMedian { name, value })
     };
     all.into_iter().filter_map(shown)
 }

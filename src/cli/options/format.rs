@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// The forms of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
+pub(crate) enum OutputFormat {
     /// A report for people
     Text,
     /// One JSON object a line
@@ -24,7 +24,7 @@ pub(crate) enum PageFormat {
     Json,
 }
 
-impl Format {
+impl OutputFormat {
     /// A table in this form.
     pub(crate) fn of_rows<R: Serialize>(
         self,

@@ -2,7 +2,7 @@
 
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
-use starpipe::camera::data_sheet::{Limits, Response, ResponseError, is_curve};
+use starpipe::camera::data_sheet::{NumberRange, Response, ResponseError, is_curve};
 use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
 
@@ -118,7 +118,12 @@ fn given(parameter: Parameter, text: &str) -> Result<Given, String> {
 }
 
 /// An option for a number, without its parser.
-pub(super) fn number_option(name: &'static str, about: &str, limits: Limits, default: &str) -> Arg {
+pub(super) fn number_option(
+    name: &'static str,
+    about: &str,
+    limits: NumberRange,
+    default: &str,
+) -> Arg {
     let mut about = about.to_owned();
     about[..1].make_ascii_uppercase();
     Arg::new(name)
@@ -129,7 +134,7 @@ pub(super) fn number_option(name: &'static str, about: &str, limits: Limits, def
 }
 
 /// Parses a number and checks its limits.
-pub(super) fn within_limits(text: &str, limits: Limits) -> Result<f64, String> {
+pub(super) fn within_limits(text: &str, limits: NumberRange) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if limits.accept(value) => Ok(value),
         _ => Err(format!("expected {limits}")),

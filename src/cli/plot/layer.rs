@@ -5,7 +5,7 @@ use plotters::style::RGBColor;
 
 /// Marks of one kind and color.
 #[derive(Clone)]
-pub(crate) struct Layer {
+pub(crate) struct PlotLayer {
     /// Name in the legend, if it is there.
     pub(crate) label: Option<String>,
     pub(crate) color: RGBColor,
@@ -56,20 +56,20 @@ pub(crate) enum Marks {
     /// A line from side to side at each y.
     Levels(Vec<f64>),
     /// Rectangles with colors of their own, from left to right and then upwards.
-    Cells(Vec<Cell>),
+    Cells(Vec<FilledRectangle>),
     /// Text centred on a place.
     Texts(Vec<(f64, f64, String)>),
 }
 
 /// A filled rectangle.
 #[derive(Clone)]
-pub(crate) struct Cell {
+pub(crate) struct FilledRectangle {
     pub(crate) x: [f64; 2],
     pub(crate) y: [f64; 2],
     pub(crate) color: RGBColor,
 }
 
-impl Layer {
+impl PlotLayer {
     pub(crate) fn new(label: impl Into<String>, color: RGBColor, marks: Marks) -> Self {
         Self {
             label: Some(label.into()),
@@ -90,7 +90,7 @@ impl Layer {
     }
 
     /// Cells whose colors are numbers.
-    pub(crate) fn colored(cells: Vec<Cell>, scale: ColorScale) -> Self {
+    pub(crate) fn colored(cells: Vec<FilledRectangle>, scale: ColorScale) -> Self {
         Self {
             scale: Some(scale),
             ..Self::unnamed(BLACK, Marks::Cells(cells))

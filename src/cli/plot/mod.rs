@@ -14,7 +14,7 @@ mod style;
 pub(crate) use axis::Axis;
 pub(crate) use figure::{Figure, Form};
 pub(crate) use files::{FigureForm, PlotFile, figure_files};
-pub(crate) use layer::{Cell, ColorScale, Dot, Layer, Marks};
+pub(crate) use layer::{ColorScale, Dot, FilledRectangle, Marks, PlotLayer};
 pub(crate) use panel::Panel;
 pub(crate) use sheet::Sheet;
 pub(crate) use style::{

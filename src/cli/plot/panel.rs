@@ -1,7 +1,7 @@
 //! A panel: layers over two axes, with a title and a legend above.
 
 use super::axis::{Axis, logarithmic};
-use super::layer::{Cell, ColorScale, Dot, Layer, Marks};
+use super::layer::{ColorScale, Dot, FilledRectangle, Marks, PlotLayer};
 use super::style::{
     Area, FONT, LETTERS_PX, MARGIN_PX, chart_on, draw_text, plot_error, two_digits,
 };
@@ -30,7 +30,7 @@ pub(crate) struct Panel {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
-    pub(crate) layers: Vec<Layer>,
+    pub(crate) layers: Vec<PlotLayer>,
 }
 
 impl Panel {
@@ -47,7 +47,7 @@ impl Panel {
                 body
             }
         };
-        let points: Vec<_> = self.layers.iter().flat_map(Layer::points).collect();
+        let points: Vec<_> = self.layers.iter().flat_map(PlotLayer::points).collect();
         let x = self.x.range(points.iter().map(|point| point.0));
         let y = self.y.range(points.iter().map(|point| point.1));
         let ends = Ends { x, y };
@@ -155,7 +155,7 @@ fn draw_scale<B: DrawingBackend>(area: &Area<B>, scale: &ColorScale) -> anyhow::
 /// Draws what a layer's marks look like, to the right of `place`.
 fn draw_legend_mark<B: DrawingBackend>(
     area: &Area<B>,
-    layer: &Layer,
+    layer: &PlotLayer,
     place: BackendCoord,
 ) -> anyhow::Result<()> {
     let (x, y) = place;
@@ -194,7 +194,7 @@ where
     X: Ranged<ValueType = f64>,
     Y: Ranged<ValueType = f64>,
 {
-    fn draw(&mut self, layer: &Layer) -> anyhow::Result<()> {
+    fn draw(&mut self, layer: &PlotLayer) -> anyhow::Result<()> {
         let color = layer.color;
         match &layer.marks {
             Marks::Line(points) => self.draw_line(points, color),
@@ -252,14 +252,14 @@ where
         self.draw_all(dots.iter().map(dot))
     }
 
-    fn draw_cells(&mut self, cells: &[Cell]) -> anyhow::Result<()> {
+    fn draw_cells(&mut self, cells: &[FilledRectangle]) -> anyhow::Result<()> {
         let Ends {
             x: [left, right],
             y: [bottom, top],
         } = self.ends;
         // Each cell reaches a little under the next ones: white would show through the seams.
         let overlap = [0.003 * (right - left), 0.003 * (top - bottom)];
-        let rectangle = |cell: &Cell| {
+        let rectangle = |cell: &FilledRectangle| {
             let x = (cell.x[1] + overlap[0]).min(right);
             let y = (cell.y[1] + overlap[1]).min(top);
             Rectangle::new([(cell.x[0], cell.y[0]), (x, y)], cell.color.filled())

@@ -5,7 +5,7 @@ use crate::cli::options::calibration::CalibrationOptions;
 use crate::cli::options::frames::{FrameOptions, MemoryOption};
 use crate::cli::options::hints::set;
 use crate::cli::options::values;
-use crate::cli::solving::Plan;
+use crate::cli::solving::SolvingPlan;
 use crate::cli::solving::options::SolvingOptions;
 use clap::{Args, ValueEnum, value_parser};
 use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
@@ -73,11 +73,11 @@ pub(super) struct DetectionOptions {
     pub(super) trails: bool,
     /// How to measure the position of a star
     #[arg(long, value_name = "METHOD", value_enum)]
-    pub(super) centroid: Option<Centroid>,
+    pub(super) centroid: Option<CentroidMethodOption>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Centroid {
+pub(super) enum CentroidMethodOption {
     /// Fit of a Gaussian spot: the most accurate
     GaussianFit,
     /// Centre of the light above a threshold: the fastest
@@ -143,9 +143,9 @@ impl ProcessArgs {
         Ok(options)
     }
 
-    pub(super) fn plan(&self) -> Result<Plan, CommandError> {
+    pub(super) fn plan(&self) -> Result<SolvingPlan, CommandError> {
         let camera = self.solving.hints.description()?;
-        Ok(Plan {
+        Ok(SolvingPlan {
             options: self.options()?,
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
@@ -154,11 +154,11 @@ impl ProcessArgs {
     }
 }
 
-impl From<Centroid> for CentroidMethod {
-    fn from(centroid: Centroid) -> Self {
+impl From<CentroidMethodOption> for CentroidMethod {
+    fn from(centroid: CentroidMethodOption) -> Self {
         match centroid {
-            Centroid::GaussianFit => Self::GaussianFit,
-            Centroid::GreyWeighted => Self::GreyWeighted,
+            CentroidMethodOption::GaussianFit => Self::GaussianFit,
+            CentroidMethodOption::GreyWeighted => Self::GreyWeighted,
         }
     }
 }

@@ -5,14 +5,14 @@ mod parts;
 
 pub(crate) use args::ProcessArgs;
 
-use super::exit::{CommandError, Exit, Outcome};
+use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::frames::FrameList;
 use super::solving::{Inputs, report_all};
 use parts::process_parts;
 use starpipe::frame::Cameras;
 
 /// `starpipe process`
-pub(crate) fn process(arguments: ProcessArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn process(arguments: ProcessArgs) -> Result<CommandOutput, CommandError> {
     if let Some(directory) = &arguments.parts.out_parquet {
         return process_parts(&arguments, directory);
     }

@@ -1,12 +1,12 @@
 //! `--out-parquet`: the frames of one worker, part by part, as rows of tables.
 
 use super::args::ProcessArgs;
-use crate::cli::exit::{CommandError, Outcome, Tally};
+use crate::cli::exit::{CommandError, CommandOutput, OutcomeTally};
 use crate::cli::input::names::frame_names;
 use crate::cli::output::messages::{one_line, report_error, report_mended, report_warning};
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::options::SolvingOptions;
-use crate::cli::solving::{Inputs, Sink, Solved, Solver};
+use crate::cli::solving::{InputSolver, Inputs, Sink, SolvedImage};
 use indicatif::ProgressBar;
 use starpipe::archive::{
     Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
@@ -22,7 +22,7 @@ use std::path::Path;
 pub(super) fn process_parts(
     arguments: &ProcessArgs,
     directory: &Path,
-) -> Result<Outcome, CommandError> {
+) -> Result<CommandOutput, CommandError> {
     let options = &arguments.parts;
     let solving = arguments.plan()?;
     let (names, _) = frame_names(&arguments.frames.frames, Cameras::Any)?;
@@ -42,12 +42,12 @@ pub(super) fn process_parts(
         };
         let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
         report_mended(archive.mended());
-        let worker = Worker(Solver {
+        let worker = Worker(InputSolver {
             pool,
             inputs: &inputs,
             context: solving.context(indexed),
             memory: solving.memory,
-            sink: Rows(indexed.catalog()),
+            sink: TableRowSink(indexed.catalog()),
         });
         let shard = options.shard.unwrap_or(Shard::ALL);
         let parts: Vec<Part> = archive.plan().shard(shard).collect();
@@ -73,12 +73,12 @@ fn claim_error(error: ArchiveError) -> CommandError {
 }
 
 /// Makes rows of tables: that of the frame, and those of its stars.
-struct Rows<'a>(&'a Catalog);
+struct TableRowSink<'a>(&'a Catalog);
 
-impl Sink for Rows<'_> {
+impl Sink for TableRowSink<'_> {
     type Made = (FrameRow, Vec<StarRow>);
 
-    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made {
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.0);
         let stars = StarRow::of_frame(&report).collect();
         (FrameRow::new(&report, &solved.solution), stars)
@@ -86,14 +86,14 @@ impl Sink for Rows<'_> {
 }
 
 /// Solves frames, and writes the rows.
-struct Worker<'a>(Solver<'a, Rows<'a>>);
+struct Worker<'a>(InputSolver<'a, TableRowSink<'a>>);
 
 /// Counts of a run.
 #[derive(Default)]
 struct Counts {
     parts: usize,
     skipped: usize,
-    frames: Tally,
+    frames: OutcomeTally,
 }
 
 impl Worker<'_> {
@@ -169,8 +169,8 @@ impl Worker<'_> {
 }
 
 impl Counts {
-    fn outcome(self) -> Outcome {
-        let Tally {
+    fn outcome(self) -> CommandOutput {
+        let OutcomeTally {
             identified,
             not_identified,
             failed,
@@ -183,7 +183,7 @@ impl Counts {
         if self.skipped > 0 {
             text += &format!("; {} there already", counted(self.skipped, "part"));
         }
-        Outcome {
+        CommandOutput {
             text: text + "\n",
             exit: self.frames.exit(),
         }

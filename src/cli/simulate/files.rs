@@ -2,7 +2,7 @@
 
 use super::args::{ImageFormat, SimulateArgs};
 use super::header::Description;
-use super::subject::Subject;
+use super::subject::FrameSubject;
 use crate::cli::exit::CommandError;
 use crate::cli::output::files::make_directory;
 use starpipe::camera::data_sheet::DataSheet;
@@ -64,7 +64,7 @@ impl FrameFiles {
     /// The files that the options name.
     pub(super) fn of(
         arguments: &SimulateArgs,
-        subject: &Subject,
+        subject: &FrameSubject,
         sheet: &DataSheet,
     ) -> Result<Self, CommandError> {
         check_out(&arguments.out)?;

@@ -1,6 +1,6 @@
 //! Simulates frames by number.
 
-use super::subject::Subject;
+use super::subject::FrameSubject;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
 use starpipe::base::epoch::ObservationDate;
 use starpipe::catalog::Catalog;
@@ -14,7 +14,7 @@ use starpipe::study::validation::draw;
 pub(super) struct Generator<'a> {
     pub(super) setup: &'a Setup,
     pub(super) simulator: &'a Simulator<'a>,
-    pub(super) subject: &'a Subject,
+    pub(super) subject: &'a FrameSubject,
     pub(super) catalog: &'a Catalog,
     pub(super) date: Option<ObservationDate>,
     pub(super) site: Option<Site>,
@@ -25,7 +25,7 @@ pub(super) struct Generator<'a> {
 }
 
 /// A simulated frame, and what is known of it.
-pub(super) struct Simulated {
+pub(super) struct GeneratedFrame {
     pub(super) frame: Frame<'static>,
     pub(super) truth: Option<Truth>,
     pub(super) pointing: Option<Pointing>,
@@ -33,7 +33,7 @@ pub(super) struct Simulated {
     pub(super) seed: u64,
 }
 
-impl Simulated {
+impl GeneratedFrame {
     /// The attitude relative to the directions of the catalogue.
     pub(super) fn attitude(&self) -> Option<Rotation<Icrs, Camera>> {
         let pointing = self.pointing.as_ref()?;
@@ -47,11 +47,11 @@ impl Simulated {
 
 impl Generator<'_> {
     /// Simulates the frame with this number.
-    pub(super) fn frame(&self, number: u64) -> Result<Simulated, FrameError> {
+    pub(super) fn frame(&self, number: u64) -> Result<GeneratedFrame, FrameError> {
         let (seed, drawn) = draw(self.seed, number);
         let simulator = self.simulator;
         let (mut frame, truth, pointing) = match self.subject {
-            Subject::Sky(fixed) => {
+            FrameSubject::Sky(fixed) => {
                 let pointing = Pointing {
                     icrs_to_camera: self.places.apparent_attitude(&fixed.unwrap_or(drawn)),
                     places: self.places,
@@ -59,15 +59,15 @@ impl Generator<'_> {
                 let (frame, truth) = simulator.frame(&pointing, seed)?;
                 (frame, Some(truth), Some(pointing))
             }
-            Subject::Stars(stars) => {
+            FrameSubject::Stars(stars) => {
                 let (frame, truth) = simulator.star_field(stars, seed)?;
                 (frame, Some(truth), None)
             }
-            Subject::Dark => (simulator.dark(seed)?, None, None),
-            Subject::Flat(electrons) => (simulator.evenly_lit(*electrons, seed)?, None, None),
+            FrameSubject::Dark => (simulator.dark(seed)?, None, None),
+            FrameSubject::Flat(electrons) => (simulator.evenly_lit(*electrons, seed)?, None, None),
         };
         frame.metadata = self.metadata();
-        Ok(Simulated {
+        Ok(GeneratedFrame {
             frame,
             truth,
             pointing,

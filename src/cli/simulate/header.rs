@@ -1,7 +1,7 @@
 //! The parameters of a simulated frame, for the header of its file.
 
-use super::generator::{Generator, Simulated};
-use super::subject::Subject;
+use super::generator::{GeneratedFrame, Generator};
+use super::subject::FrameSubject;
 use starpipe::frame::{FitsHeader, RowOrder};
 use starpipe::identify::SkyView;
 use starpipe::model::sensitivity::Reading;
@@ -11,7 +11,7 @@ use starpipe::report::wcs;
 /// Describes a frame.
 pub(super) struct Description<'a> {
     pub(super) generator: &'a Generator<'a>,
-    pub(super) simulated: &'a Simulated,
+    pub(super) simulated: &'a GeneratedFrame,
 }
 
 impl Description<'_> {
@@ -62,9 +62,9 @@ impl Description<'_> {
 
     fn kind(&self) -> &'static str {
         match self.generator.subject {
-            Subject::Sky(_) | Subject::Stars(_) => "Light Frame",
-            Subject::Dark => "Dark Frame",
-            Subject::Flat(_) => "Flat Frame",
+            FrameSubject::Sky(_) | FrameSubject::Stars(_) => "Light Frame",
+            FrameSubject::Dark => "Dark Frame",
+            FrameSubject::Flat(_) => "Flat Frame",
         }
     }
 
@@ -88,7 +88,7 @@ impl Description<'_> {
             format!("projection = {}", sheet.imperfections.projection.name()),
             format!("mirrored = {}", sheet.imperfections.mirrored),
         ];
-        if let Subject::Flat(electrons) = self.generator.subject {
+        if let FrameSubject::Flat(electrons) = self.generator.subject {
             lines.push(format!("flat_e = {electrons}"));
         }
         if let Some(icrs_to_camera) = self.simulated.attitude() {

@@ -10,7 +10,7 @@ mod subject;
 pub(crate) use args::SimulateArgs;
 
 use super::batch::for_each_ordered;
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use super::options::format::PageFormat;
 use super::output::files::{failures, write_whole};
 use super::output::messages::report_error;
@@ -20,17 +20,17 @@ use anyhow::Context;
 use files::FrameFiles;
 use generator::Generator;
 use header::Description;
-use record::FrameRecord;
+use record::SimulationRecord;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::model::sensitivity::{Budget, Detector, Rule};
 use starpipe::model::simulate::{Simulator, truth_table};
 use std::ops::ControlFlow;
-use subject::Subject;
+use subject::FrameSubject;
 
 /// `starpipe simulate`
-pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<CommandOutput, CommandError> {
     let setup = arguments.setup.setup()?;
-    let subject = Subject::of(arguments, &setup)?;
+    let subject = FrameSubject::of(arguments, &setup)?;
     let files = FrameFiles::of(arguments, &subject, &setup.scenario.camera)?;
     let pool = arguments.catalog.threads.pool()?;
     let catalog = pool.install(|| arguments.catalog.read())?;
@@ -55,8 +55,8 @@ pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<Outcome, CommandError
     };
     files.prepare()?;
     let (records, all_written) = write_all(&generator, &files, &pool);
-    let outcome = Outcome::success(match arguments.format {
-        PageFormat::Text => records.iter().map(FrameRecord::to_text).collect(),
+    let outcome = CommandOutput::success(match arguments.format {
+        PageFormat::Text => records.iter().map(SimulationRecord::to_text).collect(),
         PageFormat::Json => json_lines(records.iter())?,
     });
     Ok(outcome.if_written(all_written))
@@ -68,7 +68,7 @@ fn write_all(
     generator: &Generator,
     files: &FrameFiles,
     pool: &rayon::ThreadPool,
-) -> (Vec<FrameRecord>, bool) {
+) -> (Vec<SimulationRecord>, bool) {
     let numbers: Vec<u64> = files.numbers().collect();
     let progress = frames_bar_with_speed(numbers.len() as u64);
     let mut records = Vec::with_capacity(numbers.len());
@@ -100,7 +100,7 @@ fn write(
     generator: &Generator,
     files: &FrameFiles,
     number: u64,
-) -> anyhow::Result<(Option<FrameRecord>, Vec<anyhow::Error>)> {
+) -> anyhow::Result<(Option<SimulationRecord>, Vec<anyhow::Error>)> {
     let simulated = generator.frame(number).context("simulating a frame")?;
     let description = Description {
         generator,
@@ -109,7 +109,7 @@ fn write(
     let path = files.image(number);
     let truth_path = simulated.truth.as_ref().map(|_| path.with_extension("csv"));
     let image = files.encoded(&simulated.frame, &description)?;
-    let record = FrameRecord::new(generator, &simulated, &path, truth_path.as_deref());
+    let record = SimulationRecord::new(generator, &simulated, &path, truth_path.as_deref());
     let written = write_whole(&path, &image);
     let record = written.is_ok().then_some(record);
     let table = simulated.truth.as_ref().zip(truth_path);

@@ -1,6 +1,6 @@
 //! What is printed for each simulated frame.
 
-use super::generator::{Generator, Simulated};
+use super::generator::{GeneratedFrame, Generator};
 use serde::Serialize;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
 use starpipe::base::units::DEG_PER_RAD;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// The printed facts of a frame.
 #[derive(Debug, Serialize)]
-pub(super) struct FrameRecord {
+pub(super) struct SimulationRecord {
     frame: String,
     /// The table of what is on it, if it has one.
     truth: Option<String>,
@@ -37,11 +37,11 @@ struct AttitudeRecord {
     quaternion: [f64; 4],
 }
 
-impl FrameRecord {
+impl SimulationRecord {
     /// The record of `simulated`, which was written to `path` and its table to `truth_path`.
     pub(super) fn new(
         generator: &Generator,
-        simulated: &Simulated,
+        simulated: &GeneratedFrame,
         path: &Path,
         truth_path: Option<&Path>,
     ) -> Self {

@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// What the frames show.
 #[derive(Debug, Clone)]
-pub(super) enum Subject {
+pub(super) enum FrameSubject {
     /// The sky at a fixed attitude, or at a random attitude for each frame.
     Sky(Option<Rotation<Icrs, Camera>>),
     /// Stars at these positions, with these V magnitudes.
@@ -23,7 +23,7 @@ pub(super) enum Subject {
     Flat(f64),
 }
 
-impl Subject {
+impl FrameSubject {
     /// The subject that the options name.
     pub(super) fn of(arguments: &SimulateArgs, setup: &Setup) -> Result<Self, CommandError> {
         let has_no_sky = arguments.dark || arguments.flat.is_some();

@@ -1,6 +1,6 @@
 //! One row a frame, for people, and a summary of all.
 
-use crate::cli::exit::Tally;
+use crate::cli::exit::OutcomeTally;
 use starpipe::base::format::counted;
 use starpipe::base::statistics::median_of;
 use starpipe::report::FrameReport;
@@ -64,13 +64,13 @@ fn or_dash(value: Option<f64>) -> String {
 }
 
 /// What a run found, in a few lines.
-pub(super) struct Summary {
+pub(super) struct RunSummary {
     start: Instant,
     reasons: BTreeMap<&'static str, usize>,
     limits_vmag: Vec<f64>,
 }
 
-impl Summary {
+impl RunSummary {
     pub(super) fn new() -> Self {
         Self {
             start: Instant::now(),
@@ -87,7 +87,7 @@ impl Summary {
     }
 
     /// The summary; times are those of a clock.
-    pub(super) fn text(&mut self, tally: &Tally) -> String {
+    pub(super) fn text(&mut self, tally: &OutcomeTally) -> String {
         let all = tally.identified + tally.not_identified + tally.failed;
         let mut parts = vec![format!("{} identified", tally.identified)];
         let reasons = self.reasons.iter();
@@ -121,12 +121,12 @@ mod tests {
 
     #[test]
     fn a_summary_counts_reasons() {
-        let tally = Tally {
+        let tally = OutcomeTally {
             identified: 7,
             not_identified: 2,
             failed: 1,
         };
-        let mut summary = Summary::new();
+        let mut summary = RunSummary::new();
         summary.reasons.insert("no_match", 2);
         summary.limits_vmag = vec![6.0, 8.0, 7.0];
         let text = summary.text(&tally);

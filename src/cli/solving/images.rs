@@ -28,7 +28,7 @@ impl Inputs {
 }
 
 /// A solved image.
-pub(crate) struct Solved {
+pub(crate) struct SolvedImage {
     pub(crate) solution: Solution,
     /// The frame, if there is one.
     pub(crate) frame: Option<Frame<'static>>,
@@ -38,11 +38,11 @@ pub(crate) struct Solved {
 pub(super) struct Images<'a> {
     inputs: &'a Inputs,
     path: &'a Path,
-    left: Left,
+    left: RemainingInput,
 }
 
 /// What is left of an input.
-enum Left {
+enum RemainingInput {
     All,
     Pages(Pages),
     Nothing,
@@ -53,7 +53,7 @@ impl<'a> Images<'a> {
         Self {
             inputs,
             path,
-            left: Left::All,
+            left: RemainingInput::All,
         }
     }
 
@@ -62,22 +62,25 @@ impl<'a> Images<'a> {
         &mut self,
         context: &Context,
         workspace: &mut Workspace,
-    ) -> Option<(ImageName<'a>, anyhow::Result<Solved>)> {
+    ) -> Option<(ImageName<'a>, anyhow::Result<SolvedImage>)> {
         let image = ImageName::of(self.path);
-        match (mem::replace(&mut self.left, Left::Nothing), self.inputs) {
-            (Left::Nothing, _) => None,
-            (Left::Pages(pages), _) => self.solve_page(pages, context, workspace),
-            (Left::All, Inputs::Lists(options)) => {
+        match (
+            mem::replace(&mut self.left, RemainingInput::Nothing),
+            self.inputs,
+        ) {
+            (RemainingInput::Nothing, _) => None,
+            (RemainingInput::Pages(pages), _) => self.solve_page(pages, context, workspace),
+            (RemainingInput::All, Inputs::Lists(options)) => {
                 Some((image, solve_list(self.path, options, context, workspace)))
             }
-            (Left::All, Inputs::Frames(PageChoice::All)) => {
+            (RemainingInput::All, Inputs::Frames(PageChoice::All)) => {
                 workspace.begin(context);
                 match all_pages(self.path, &mut workspace.frames) {
                     Ok(pages) => self.solve_page(pages, context, workspace),
                     Err(error) => Some((image, Err(Error::from(error).into()))),
                 }
             }
-            (Left::All, Inputs::Frames(choice)) => {
+            (RemainingInput::All, Inputs::Frames(choice)) => {
                 let read = |buffers: &mut Buffers| read_frame(self.path, choice.number(), buffers);
                 Some((image, solve_frame(&image, read, context, workspace)))
             }
@@ -89,14 +92,14 @@ impl<'a> Images<'a> {
         mut pages: Pages,
         context: &Context,
         workspace: &mut Workspace,
-    ) -> Option<(ImageName<'a>, anyhow::Result<Solved>)> {
+    ) -> Option<(ImageName<'a>, anyhow::Result<SolvedImage>)> {
         let image = ImageName::of(self.path).page(pages.advance()?);
         let read = |buffers: &mut Buffers| {
             let frame = pages.image(buffers);
             frame.map_err(|error| error.in_file(&image.to_path()))
         };
         let solved = solve_frame(&image, read, context, workspace);
-        self.left = Left::Pages(pages);
+        self.left = RemainingInput::Pages(pages);
         Some((image, solved))
     }
 }
@@ -106,12 +109,12 @@ fn solve_frame(
     read: impl FnOnce(&mut Buffers) -> Result<Frame<'static>, FrameError>,
     context: &Context,
     workspace: &mut Workspace,
-) -> anyhow::Result<Solved> {
+) -> anyhow::Result<SolvedImage> {
     let name = image.to_path();
     solve_guarded(&name, workspace, |workspace| {
         let (solution, frame) = solve_read(&name, read, context, workspace)?;
         let frame = Some(frame);
-        Ok(Solved { solution, frame })
+        Ok(SolvedImage { solution, frame })
     })
 }
 
@@ -120,12 +123,12 @@ fn solve_list(
     options: &CentroidListOptions,
     context: &Context,
     workspace: &mut Workspace,
-) -> anyhow::Result<Solved> {
+) -> anyhow::Result<SolvedImage> {
     solve_guarded(path, workspace, |workspace| {
         let list = centroid_list::read(path, options)?;
         let solution = solve_centroids(&list, context, workspace)
             .with_context(|| format!("reading {}", path.display()))?;
-        Ok(Solved {
+        Ok(SolvedImage {
             solution,
             frame: None,
         })

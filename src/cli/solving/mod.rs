@@ -10,6 +10,6 @@ mod reports;
 mod result_files;
 mod solver;
 
-pub(crate) use images::{Inputs, Solved};
-pub(crate) use reports::{Plan, report_all};
-pub(crate) use solver::{Sink, Solver};
+pub(crate) use images::{Inputs, SolvedImage};
+pub(crate) use reports::{SolvingPlan, report_all};
+pub(crate) use solver::{InputSolver, Sink};

@@ -1,8 +1,8 @@
 //! Reports on standard output, one after the other.
 
-use super::frame_table::{self, Summary};
+use super::frame_table::{self, RunSummary};
 use super::options::{OutputOptions, ReportFormat};
-use crate::cli::exit::Tally;
+use crate::cli::exit::OutcomeTally;
 use crate::cli::output::stdout::print;
 use starpipe::archive::FrameRow;
 use starpipe::base::remedy::OptionNames;
@@ -18,7 +18,7 @@ pub(super) struct Printer {
     format: ReportFormat,
     text: TextOptions,
     reports: usize,
-    summary: Summary,
+    summary: RunSummary,
 }
 
 impl Printer {
@@ -38,7 +38,7 @@ impl Printer {
             format: options.format.unwrap_or(usual),
             text,
             reports: 0,
-            summary: Summary::new(),
+            summary: RunSummary::new(),
         }
     }
 
@@ -63,7 +63,7 @@ impl Printer {
     }
 
     /// Prints what follows the last report.
-    pub(super) fn finish(&mut self, tally: &Tally) -> anyhow::Result<ControlFlow<()>> {
+    pub(super) fn finish(&mut self, tally: &OutcomeTally) -> anyhow::Result<ControlFlow<()>> {
         if self.is_silent || self.format != ReportFormat::Table {
             return Ok(ControlFlow::Continue(()));
         }

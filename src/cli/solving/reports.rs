@@ -1,11 +1,11 @@
 //! Reports of many inputs: printed in their order, with result files where these are wanted.
 
-use super::images::{Inputs, Solved};
+use super::images::{Inputs, SolvedImage};
 use super::options::SolvingOptions;
 use super::printer::Printer;
 use super::result_files::ResultFiles;
-use super::solver::{Sink, Solver};
-use crate::cli::exit::{CommandError, Exit, Tally};
+use super::solver::{InputSolver, Sink};
+use crate::cli::exit::{CommandError, Exit, OutcomeTally};
 use crate::cli::output::messages::report_error;
 use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
@@ -23,14 +23,14 @@ use std::path::PathBuf;
 
 /// What the inputs are solved with, besides the catalog.
 #[derive(Default)]
-pub(crate) struct Plan {
+pub(crate) struct SolvingPlan {
     pub(crate) options: SolveOptions,
     pub(crate) camera: Option<CameraDescription>,
     pub(crate) calibration: Option<Calibration>,
     pub(crate) memory: MemoryLimit,
 }
 
-impl Plan {
+impl SolvingPlan {
     pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         let mut context = Context::new(indexed).with_options(&self.options, self.camera.clone());
         context.calibration = self.calibration.as_ref();
@@ -44,7 +44,7 @@ pub(crate) fn report_all(
     inputs: &Inputs,
     paths: &[PathBuf],
     options: SolvingOptions,
-    plan: &Plan,
+    plan: &SolvingPlan,
 ) -> Result<Exit, CommandError> {
     let SolvingOptions {
         output, catalog, ..
@@ -53,13 +53,13 @@ pub(crate) fn report_all(
         let extensions = output.result_extensions(inputs.have_pictures());
         overwrite::check(paths, directory, &extensions)?;
     }
-    let mut run = Run {
+    let mut run = ReportRun {
         printer: Printer::new(&output, paths.len()),
         progress: match paths.len() {
             count if count > 1 && !output.quiet => frames_bar(count as u64),
             _ => ProgressBar::hidden(),
         },
-        tally: Tally::default(),
+        tally: OutcomeTally::default(),
     };
     let files = ResultFiles::new(&output, plan.memory)?;
     let needs_rows = run.printer.needs_rows();
@@ -67,7 +67,7 @@ pub(crate) fn report_all(
         catalog.with_index_told(!output.quiet, |pool, indexed| {
             let mut context = plan.context(indexed);
             context.measure_known_sky = true;
-            let solver = Solver {
+            let solver = InputSolver {
                 pool,
                 inputs,
                 context,
@@ -105,7 +105,7 @@ struct Report {
 impl Sink for Reports<'_> {
     type Made = Report;
 
-    fn make(&self, image: &ImageName, solved: &Solved) -> Report {
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Report {
         let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
         let failures = self.files.save(image, solved, &report, self.catalog);
         let row = self
@@ -120,13 +120,13 @@ impl Sink for Reports<'_> {
 }
 
 /// State of the inputs so far.
-struct Run {
+struct ReportRun {
     printer: Printer,
     progress: ProgressBar,
-    tally: Tally,
+    tally: OutcomeTally,
 }
 
-impl Run {
+impl ReportRun {
     /// Prints the reports of an input. Breaks if nobody reads them any longer.
     fn take_all(&mut self, images: Vec<(String, anyhow::Result<Report>)>) -> ControlFlow<()> {
         self.progress.inc(1);

@@ -1,6 +1,6 @@
 //! Result files of an input, which `--out` asks for.
 
-use super::images::Solved;
+use super::images::SolvedImage;
 use super::options::OutputOptions;
 use crate::cli::input::stdin::is_stdin;
 use crate::cli::output::files::{NewFile, failures, make_directory, remove_outdated};
@@ -23,7 +23,7 @@ pub(super) struct ResultFiles<'a> {
 struct Results<'a> {
     directory: &'a Path,
     image: &'a ImageName<'a>,
-    solved: &'a Solved,
+    solved: &'a SolvedImage,
     report: &'a FrameReport,
 }
 
@@ -46,7 +46,7 @@ impl<'a> ResultFiles<'a> {
     pub(super) fn save(
         &self,
         image: &ImageName,
-        solved: &Solved,
+        solved: &SolvedImage,
         report: &FrameReport,
         catalog: &Catalog,
     ) -> Vec<anyhow::Error> {

@@ -1,6 +1,6 @@
 //! Solves many inputs on all threads.
 
-use super::images::{Images, Inputs, Solved};
+use super::images::{Images, Inputs, SolvedImage};
 use crate::cli::batch::for_each_ordered;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::pipeline::{Context, Workspace, solve_guarded};
@@ -14,11 +14,11 @@ pub(crate) trait Sink: Sync {
     type Made: Send;
 
     /// Makes it.
-    fn make(&self, image: &ImageName, solved: &Solved) -> Self::Made;
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made;
 }
 
 /// Solves inputs, and makes of each image what the sink makes.
-pub(crate) struct Solver<'a, S> {
+pub(crate) struct InputSolver<'a, S> {
     pub(crate) pool: &'a rayon::ThreadPool,
     pub(crate) inputs: &'a Inputs,
     pub(crate) context: Context<'a>,
@@ -26,7 +26,7 @@ pub(crate) struct Solver<'a, S> {
     pub(crate) sink: S,
 }
 
-impl<S: Sink> Solver<'_, S> {
+impl<S: Sink> InputSolver<'_, S> {
     /// Hands what is made of the images of each input, or why nothing is, to `take`, in the order of
     /// the inputs. If `take` breaks, the remaining inputs are skipped.
     pub(crate) fn solve_all<P: AsRef<Path> + Sync>(
@@ -56,7 +56,7 @@ impl<S: Sink> Solver<'_, S> {
     fn make(
         &self,
         image: &ImageName,
-        solved: Solved,
+        solved: SolvedImage,
         workspace: &mut Workspace,
     ) -> anyhow::Result<S::Made> {
         let name = image.to_path();

@@ -9,7 +9,7 @@ use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Arg, Args};
-use starpipe::study::validation::Protocol;
+use starpipe::study::validation::ValidationProtocol;
 use std::path::PathBuf;
 
 /// Suites by name. `validate --suite NAME` is the hidden command `validate-NAME`, as each has options of its own.
@@ -134,8 +134,8 @@ pub(super) struct RunOptions {
 
 impl RunOptions {
     /// What is simulated; whether the pipeline is given the camera's description.
-    pub(super) fn protocol(&self, scale_known: bool) -> Result<Protocol, CommandError> {
-        Ok(Protocol {
+    pub(super) fn protocol(&self, scale_known: bool) -> Result<ValidationProtocol, CommandError> {
+        Ok(ValidationProtocol {
             setup: self.setup.setup()?,
             scale_known,
             site: None,

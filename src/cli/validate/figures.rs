@@ -1,11 +1,11 @@
 //! The figures of a run and of a study.
 
-use crate::cli::plot::{Axis, BLUE, Dot, Layer, Marks, ORANGE, Panel, Sheet};
+use crate::cli::plot::{Axis, BLUE, Dot, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use plotters::style::RGBColor;
 use starpipe::base::statistics::normal_density;
 use starpipe::study::validation::{
     AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
-    IdentificationSummary, Pull, PullSummary, StudyRow, Summary,
+    IdentificationSummary, Pull, PullSummary, StudyRow, ValidationSummary,
 };
 
 /// The 95th percentile beside the median.
@@ -13,7 +13,7 @@ const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
 const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
 
 /// The figures of a run with their names.
-pub(super) fn of_run(summary: &Summary) -> Vec<(&'static str, Sheet)> {
+pub(super) fn of_run(summary: &ValidationSummary) -> Vec<(&'static str, Sheet)> {
     let mut sheets = vec![
         ("identification", identification(&summary.identification)),
         ("completeness", completeness(&summary.completeness)),
@@ -55,7 +55,7 @@ fn identification(found: &IdentificationSummary) -> Sheet {
             ..Axis::of("stars brighter than the predicted limit")
         },
         y: Axis::of("% of the frames").within(lowest, 100.5),
-        layers: vec![Layer::new(
+        layers: vec![PlotLayer::new(
             "with 95 % intervals (Clopper-Pearson)",
             BLUE,
             Marks::Dots(dots),
@@ -91,9 +91,9 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
         x: Axis::of("V"),
         y: Axis::of("% of isolated stars found").within(0.0, 103.0),
         layers: vec![
-            Layer::guide(Marks::Levels(vec![50.0])),
-            Layer::new("predicted", ORANGE, Marks::Line(line.collect())),
-            Layer::new(
+            PlotLayer::guide(Marks::Levels(vec![50.0])),
+            PlotLayer::new("predicted", ORANGE, Marks::Line(line.collect())),
+            PlotLayer::new(
                 "found, with 95 % intervals",
                 BLUE,
                 Marks::Dots(dots.collect()),
@@ -130,8 +130,8 @@ fn centroids(found: &CentroidSummary) -> Sheet {
                 x: snr(),
                 y: Axis::log("root mean square (px)", true),
                 layers: vec![
-                    Layer::new("Cramér-Rao bound", ORANGE, Marks::Line(bound.collect())),
-                    Layer::new("measured", BLUE, Marks::Dots(errors.collect())),
+                    PlotLayer::new("Cramér-Rao bound", ORANGE, Marks::Line(bound.collect())),
+                    PlotLayer::new("measured", BLUE, Marks::Dots(errors.collect())),
                 ],
             },
             Panel {
@@ -139,8 +139,8 @@ fn centroids(found: &CentroidSummary) -> Sheet {
                 x: snr(),
                 y: Axis::of("measured / bound"),
                 layers: vec![
-                    Layer::guide(Marks::Levels(vec![1.0])),
-                    Layer::new("± standard error", BLUE, Marks::Dots(ratios)),
+                    PlotLayer::guide(Marks::Levels(vec![1.0])),
+                    PlotLayer::new("± standard error", BLUE, Marks::Dots(ratios)),
                 ],
             },
         ],
@@ -179,12 +179,12 @@ fn pulls(found: &PullSummary) -> Sheet {
             ..Axis::of("density")
         },
         layers: vec![
-            Layer::new(
+            PlotLayer::new(
                 format!("{} values", pull.count),
                 BLUE,
                 Marks::Bars(densities(&pull.histogram, pull.count)),
             ),
-            Layer::new(
+            PlotLayer::new(
                 "standard normal",
                 ORANGE,
                 Marks::Line(normal_curve(5.0, 1.0)),
@@ -203,7 +203,7 @@ fn pulls(found: &PullSummary) -> Sheet {
 }
 
 fn faintest(found: &DifferenceSummary) -> Sheet {
-    let mut layers = vec![Layer::new(
+    let mut layers = vec![PlotLayer::new(
         format!("{} frames", found.count),
         BLUE,
         Marks::Bars(densities(&found.histogram, found.count)),
@@ -211,7 +211,7 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
     if let Some(sd) = found.expected_sd.filter(|sd| *sd > 0.0) {
         let curve = normal_curve(1.5, sd);
         let label = format!("expected, as if normal: scatter {sd:.2}");
-        layers.push(Layer::new(label, ORANGE, Marks::Line(curve)));
+        layers.push(PlotLayer::new(label, ORANGE, Marks::Line(curve)));
     }
     Sheet::of_one(Panel {
         title: format!(
@@ -240,12 +240,12 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
         x: Axis::log("arcseconds", true),
         y: Axis::of("% of the frames are off by less").within(0.0, 102.0),
         layers: vec![
-            Layer::new(
+            PlotLayer::new(
                 format!("boresight: half below {:.2}″", boresight.p50),
                 BLUE,
                 cumulative(&found.boresight_percentiles_arcsec),
             ),
-            Layer::new(
+            PlotLayer::new(
                 format!("roll: half below {:.1}″", roll.p50),
                 ORANGE,
                 cumulative(&found.roll_percentiles_arcsec),
@@ -259,7 +259,7 @@ type Measured = fn(&StudyRow) -> (Option<f64>, Option<f64>);
 
 /// The rows of one parameter.
 fn study(rows: &[StudyRow]) -> Sheet {
-    let panel = |title: &str, y: Axis, layers: Vec<Layer>| Panel {
+    let panel = |title: &str, y: Axis, layers: Vec<PlotLayer>| Panel {
         title: title.to_owned(),
         x: Axis::log(rows[0].title.clone(), rows[0].is_log),
         y,
@@ -277,7 +277,7 @@ fn study(rows: &[StudyRow]) -> Sheet {
             "Errors of centroids in units of the bound",
             Axis::of("root mean square / bound"),
             vec![
-                Layer::guide(Marks::Levels(vec![1.0])),
+                PlotLayer::guide(Marks::Levels(vec![1.0])),
                 measured("± standard error", rows, |row| {
                     (row.centroid_ratio, row.centroid_ratio_sigma)
                 }),
@@ -292,34 +292,34 @@ fn study(rows: &[StudyRow]) -> Sheet {
     Sheet::new(panels, 2)
 }
 
-fn rates(rows: &[StudyRow]) -> (Axis, Vec<Layer>) {
+fn rates(rows: &[StudyRow]) -> (Axis, Vec<PlotLayer>) {
     let rate = |row: &StudyRow| {
         let interval = [row.right_low_percent, row.right_high_percent];
         (row.value, row.right_percent, interval)
     };
     let rates: Vec<Dot> = rows.iter().map(rate).collect();
     let axis = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
-    let layer = Layer::new("with 95 % intervals", BLUE, Marks::Dots(rates));
+    let layer = PlotLayer::new("with 95 % intervals", BLUE, Marks::Dots(rates));
     (axis, vec![layer])
 }
 
-fn limits(rows: &[StudyRow]) -> Vec<Layer> {
+fn limits(rows: &[StudyRow]) -> Vec<PlotLayer> {
     let predicted = line(rows, |row| Some(row.predicted_limit_vmag));
     vec![
-        Layer::new("predicted", ORANGE, predicted),
+        PlotLayer::new("predicted", ORANGE, predicted),
         measured("measured", rows, |row| {
             (row.measured_limit_vmag, row.measured_limit_sigma_mag)
         }),
     ]
 }
 
-fn attitude_errors(rows: &[StudyRow]) -> Vec<Layer> {
+fn attitude_errors(rows: &[StudyRow]) -> Vec<PlotLayer> {
     let line = |value| line(rows, value);
     vec![
-        Layer::new("boresight 50 %", BLUE, line(|row| row.boresight_p50_arcsec)),
-        Layer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
-        Layer::new("roll 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
-        Layer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
+        PlotLayer::new("boresight 50 %", BLUE, line(|row| row.boresight_p50_arcsec)),
+        PlotLayer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
+        PlotLayer::new("roll 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
+        PlotLayer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
     ]
 }
 
@@ -329,12 +329,12 @@ fn line(rows: &[StudyRow], value: fn(&StudyRow) -> Option<f64>) -> Marks {
 }
 
 /// Dots with standard errors, where both are known.
-fn measured(label: &str, rows: &[StudyRow], value: Measured) -> Layer {
+fn measured(label: &str, rows: &[StudyRow], value: Measured) -> PlotLayer {
     let dots = rows.iter().filter_map(|row| {
         let (Some(value), Some(sigma)) = value(row) else {
             return None;
         };
         Some((row.value, value, [value - sigma, value + sigma]))
     });
-    Layer::new(label, BLUE, Marks::Dots(dots.collect()))
+    PlotLayer::new(label, BLUE, Marks::Dots(dots.collect()))
 }

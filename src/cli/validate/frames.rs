@@ -11,7 +11,7 @@ pub(super) const MOST_ROWS: usize = 5000;
 
 /// The most used columns of a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct FrameRow {
+pub(super) struct RunFrameRow {
     /// The run, where there are several.
     run: Option<String>,
     pub(super) frame: u64,
@@ -35,7 +35,7 @@ pub(super) struct FrameRow {
     notes: Option<String>,
 }
 
-impl From<FrameRecord> for FrameRow {
+impl From<FrameRecord> for RunFrameRow {
     fn from(record: FrameRecord) -> Self {
         Self {
             run: None,
@@ -62,7 +62,7 @@ impl From<FrameRecord> for FrameRow {
     }
 }
 
-impl FrameRow {
+impl RunFrameRow {
     fn failed(&self) -> bool {
         self.status != Answer::Right
     }
@@ -81,7 +81,7 @@ impl FrameRow {
 #[derive(Default)]
 pub(super) struct RunFrames {
     /// Wrong ones first, then those without an answer, then the others; at most [`MOST_ROWS`].
-    pub(super) rows: Vec<FrameRow>,
+    pub(super) rows: Vec<RunFrameRow>,
     /// Pictures of those that failed.
     pub(super) pictures: Vec<Thumbnail>,
 }
@@ -95,7 +95,7 @@ impl RunFrames {
     ) -> anyhow::Result<Self> {
         let (mut rows, mut right) = (Vec::new(), Vec::new());
         for record in tables.frames()? {
-            let row = FrameRow::from(record?);
+            let row = RunFrameRow::from(record?);
             let list = if row.failed() { &mut rows } else { &mut right };
             if list.len() < MOST_ROWS {
                 list.push(row);
@@ -117,15 +117,15 @@ impl RunFrames {
 /// The frames of several runs that failed.
 #[derive(Default)]
 pub(super) struct FailedFrames {
-    pub(super) rows: Vec<FrameRow>,
+    pub(super) rows: Vec<RunFrameRow>,
     pub(super) pictures: Vec<Thumbnail>,
 }
 
 impl FailedFrames {
     /// Adds those of a run.
     pub(super) fn add(&mut self, run: &str, frames: RunFrames) {
-        let failed = frames.rows.into_iter().filter(FrameRow::failed);
-        let named = failed.map(|row| FrameRow {
+        let failed = frames.rows.into_iter().filter(RunFrameRow::failed);
+        let named = failed.map(|row| RunFrameRow {
             run: Some(run.to_owned()),
             ..row
         });

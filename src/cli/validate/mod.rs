@@ -19,18 +19,18 @@ pub(crate) use args::{HardArgs, SkyArgs, ValidateArgs};
 pub(crate) use clutter::{ClutterArgs, clutter};
 pub(crate) use robustness::{RobustnessArgs, robustness};
 
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use super::output::files::write_each;
 use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use args::RunOptions;
 use shared::Shared;
-use starpipe::report::page::{Page, Thumbnail};
+use starpipe::report::page::{PageContent, Thumbnail};
 use starpipe::study::validation::{HARD_SUITE, HardRow, StudyRow};
 use std::cell::Cell;
 
 /// `starpipe validate` without a suite
-pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn validate(arguments: &ValidateArgs) -> Result<CommandOutput, CommandError> {
     let options = &arguments.run;
     let protocol = options.protocol(!arguments.scale_unknown)?;
     let runs = study::runs(&arguments.sweep, &protocol)?;
@@ -52,7 +52,7 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<Outcome, CommandError
 }
 
 /// `starpipe validate --suite hard`
-pub(crate) fn hard(arguments: &HardArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn hard(arguments: &HardArgs) -> Result<CommandOutput, CommandError> {
     let options = &arguments.run;
     let protocol = options.protocol(!arguments.scale_unknown)?;
     with_page(options, HARD_SUITE.len(), |shared| {
@@ -65,7 +65,7 @@ pub(crate) fn hard(arguments: &HardArgs) -> Result<Outcome, CommandError> {
 }
 
 /// `starpipe validate --suite sky`
-pub(crate) fn sky(arguments: &SkyArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn sky(arguments: &SkyArgs) -> Result<CommandOutput, CommandError> {
     let options = &arguments.run;
     let protocol = options.protocol(true)?;
     with_page(options, 1, |shared| {
@@ -82,8 +82,8 @@ pub(crate) fn sky(arguments: &SkyArgs) -> Result<Outcome, CommandError> {
 fn with_page(
     options: &RunOptions,
     runs: usize,
-    work: impl FnOnce(&Shared) -> Result<(String, Page), CommandError>,
-) -> Result<Outcome, CommandError> {
+    work: impl FnOnce(&Shared) -> Result<(String, PageContent), CommandError>,
+) -> Result<CommandOutput, CommandError> {
     let default = || options.out.join("validate.html");
     let page_path = options.html.checked_path(&[], default)?;
     options.catalog.with_index(|pool, indexed| {
@@ -103,6 +103,6 @@ fn with_page(
             super::page::file(path, &page)
         });
         let all_written = write_each(page) && shared.all_written.get();
-        Ok(Outcome::success(text).if_written(all_written))
+        Ok(CommandOutput::success(text).if_written(all_written))
     })
 }

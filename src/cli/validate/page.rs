@@ -1,17 +1,17 @@
 //! The pages of a run, of a study and of a suite.
 
 use super::figures;
-use super::frames::{FailedFrames, FrameRow, MOST_ROWS};
-use super::run::Run;
+use super::frames::{FailedFrames, MOST_ROWS, RunFrameRow};
+use super::run::ValidationRun;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, codes_note, figure, options, table};
 use crate::cli::plot::Sheet;
 use serde::Serialize;
 use starpipe::base::format::{counted, five_digits};
 use starpipe::catalog::Catalog;
-use starpipe::report::page::{Fact, Page, PageTable};
+use starpipe::report::page::{Fact, PageContent, PageTable};
 use starpipe::study::night_sky::SkySummary;
-use starpipe::study::validation::{HardRow, Pull, StudyRow, Summary};
+use starpipe::study::validation::{HardRow, Pull, StudyRow, ValidationSummary};
 use std::collections::BTreeMap;
 
 const FAILED: &str = "Frames that failed";
@@ -21,9 +21,9 @@ const OFF_SIGMA: f64 = 3.0;
 const NEES: f64 = 3.0;
 
 /// The page of a run.
-pub(super) fn of_run(run: Run) -> anyhow::Result<Page> {
-    let Run { summary, frames } = run;
-    let mut page = Page {
+pub(super) fn of_run(run: ValidationRun) -> anyhow::Result<PageContent> {
+    let ValidationRun { summary, frames } = run;
+    let mut page = PageContent {
         title: format!("Validation of {}", summary.facts.camera),
         question: format!(
             "How often is a frame of {} identified, and are the stated errors true? {} at random attitudes, scale {}.",
@@ -42,7 +42,7 @@ pub(super) fn of_run(run: Run) -> anyhow::Result<Page> {
         thumbnails_title: FAILED.to_owned(),
         thumbnails: frames.pictures,
         tables: tables(&summary, &frames.rows)?,
-        ..Page::default()
+        ..PageContent::default()
     };
     for (name, sheet) in figures::of_run(&summary) {
         page.figures.push(figure(&sheet, caption(name))?);
@@ -55,14 +55,14 @@ pub(super) fn of_suite(
     camera: &str,
     rows: &[HardRow],
     failed: FailedFrames,
-) -> anyhow::Result<Page> {
-    let case = |row: &HardRow| Trials {
+) -> anyhow::Result<PageContent> {
+    let case = |row: &HardRow| TrialGroup {
         name: row.case.to_string(),
         counts: [row.frames, row.right, row.wrong],
         nees: row.nees_mean.zip(row.nees_sigma),
     };
-    let runs: Vec<Trials> = rows.iter().map(case).collect();
-    let page = Page {
+    let runs: Vec<TrialGroup> = rows.iter().map(case).collect();
+    let page = PageContent {
         title: format!("Hard cases for {camera}"),
         question: format!(
             "How often is a frame identified where lens, spot or detector are not what the pipeline assumes? {}.",
@@ -70,15 +70,19 @@ pub(super) fn of_suite(
         ),
         text: HardRow::to_text(rows),
         tables: vec![table("Cases", &csv_table(rows.iter())?)?],
-        ..Page::default()
+        ..PageContent::default()
     };
     with_runs(page, &runs, failed)
 }
 
 /// The page of the sky suite.
-pub(super) fn of_sky(camera: &str, summary: &SkySummary, sheet: &Sheet) -> anyhow::Result<Page> {
+pub(super) fn of_sky(
+    camera: &str,
+    summary: &SkySummary,
+    sheet: &Sheet,
+) -> anyhow::Result<PageContent> {
     let all = summary.groups.first();
-    Ok(Page {
+    Ok(PageContent {
         title: format!("Skies over {camera}"),
         question: format!(
             "How accurate are brightness, extinction, clouds and limits of the sky? {}.",
@@ -97,7 +101,7 @@ pub(super) fn of_sky(camera: &str, summary: &SkySummary, sheet: &Sheet) -> anyho
                 &csv_table(summary.clear.iter())?,
             )?,
         ],
-        ..Page::default()
+        ..PageContent::default()
     })
 }
 
@@ -106,14 +110,14 @@ pub(super) fn of_study(
     camera: &str,
     rows: &[StudyRow],
     failed: FailedFrames,
-) -> anyhow::Result<Page> {
-    let value = |row: &StudyRow| Trials {
+) -> anyhow::Result<PageContent> {
+    let value = |row: &StudyRow| TrialGroup {
         name: format!("{} {}", row.parameter, five_digits(row.value)),
         counts: [row.frames, row.right, row.wrong],
         nees: row.nees_mean.zip(row.nees_sigma),
     };
-    let runs: Vec<Trials> = rows.iter().map(value).collect();
-    let mut page = Page {
+    let runs: Vec<TrialGroup> = rows.iter().map(value).collect();
+    let mut page = PageContent {
         title: format!("Study of {camera}"),
         question: format!(
             "How do identification, limit and errors depend on a parameter? {}.",
@@ -121,7 +125,7 @@ pub(super) fn of_study(
         ),
         text: StudyRow::to_text(rows),
         tables: vec![table("Values", &csv_table(rows.iter())?)?],
-        ..Page::default()
+        ..PageContent::default()
     };
     for (name, sheet) in figures::of_study(rows) {
         let caption = format!("Identification, limit and errors over {name}");
@@ -131,24 +135,28 @@ pub(super) fn of_study(
 }
 
 /// The page with where it is from.
-pub(super) fn with_provenance(page: Page, seed: u64, of_stars: &Catalog) -> Page {
+pub(super) fn with_provenance(page: PageContent, seed: u64, of_stars: &Catalog) -> PageContent {
     let provenance = vec![
         options(),
         Fact::new("Seed", seed.to_string()),
         catalog(of_stars),
     ];
-    Page { provenance, ..page }
+    PageContent { provenance, ..page }
 }
 
 /// The page with the answer of several runs, their doubts, and the frames that failed.
-fn with_runs(mut page: Page, runs: &[Trials], failed: FailedFrames) -> anyhow::Result<Page> {
+fn with_runs(
+    mut page: PageContent,
+    runs: &[TrialGroup],
+    failed: FailedFrames,
+) -> anyhow::Result<PageContent> {
     if !failed.rows.is_empty() {
         let csv = csv_table(failed.rows.iter())?;
         page.tables.push(table(FAILED, &csv)?);
     }
     let counts = [0, 1, 2].map(|of| runs.iter().map(|run| run.counts[of]).sum());
     let notes = doubts(runs).into_iter().chain(cut_note(failed.rows.len()));
-    Ok(Page {
+    Ok(PageContent {
         answer: rates(counts),
         notes: notes.collect(),
         thumbnails_title: FAILED.to_owned(),
@@ -173,7 +181,7 @@ fn rates([frames, right, wrong]: [usize; 3]) -> String {
 }
 
 /// The frames of a hard case, or of a value of a parameter.
-struct Trials {
+struct TrialGroup {
     name: String,
     /// Of all frames, of right and of wrong ones.
     counts: [usize; 3],
@@ -183,10 +191,10 @@ struct Trials {
 
 /// Notes on runs with wrong answers, on the one with the fewest right ones, and on errors that are stated
 /// wrongly.
-fn doubts(runs: &[Trials]) -> Vec<String> {
+fn doubts(runs: &[TrialGroup]) -> Vec<String> {
     let mut notes = Vec::new();
     let mut least: Option<(f64, String)> = None;
-    for Trials { name, counts, .. } in runs {
+    for TrialGroup { name, counts, .. } in runs {
         let [frames, right, wrong] = *counts;
         let share = right as f64 / frames.max(1) as f64;
         let said = format!("{name}: {}", rates(*counts));
@@ -197,7 +205,7 @@ fn doubts(runs: &[Trials]) -> Vec<String> {
         }
     }
     notes.extend(least.map(|(_, said)| format!("Fewest without a wrong answer: {said}")));
-    let nees = runs.iter().filter_map(|Trials { name, nees, .. }| {
+    let nees = runs.iter().filter_map(|TrialGroup { name, nees, .. }| {
         let (mean, sigma) = (*nees)?;
         Some(format!("{name}: {}", nees_note(mean, sigma)?))
     });
@@ -205,7 +213,7 @@ fn doubts(runs: &[Trials]) -> Vec<String> {
     notes
 }
 
-fn answer(summary: &Summary) -> String {
+fn answer(summary: &ValidationSummary) -> String {
     let all = &summary.identification.all;
     format!(
         "{} 95 % interval of right answers: {:.2} to {:.2} %; of wrong ones: below {:.2} %.",
@@ -216,7 +224,7 @@ fn answer(summary: &Summary) -> String {
     )
 }
 
-fn facts(summary: &Summary) -> Vec<Fact> {
+fn facts(summary: &ValidationSummary) -> Vec<Fact> {
     let completeness = &summary.completeness;
     let mut facts = vec![Fact::new(
         "Half of the stars should be found at",
@@ -274,7 +282,7 @@ fn nees_note(mean: f64, sigma: f64) -> Option<String> {
     })
 }
 
-fn notes(summary: &Summary, rows: &[FrameRow]) -> Vec<String> {
+fn notes(summary: &ValidationSummary, rows: &[RunFrameRow]) -> Vec<String> {
     let mut notes = Vec::new();
     let wrong = summary.identification.all.wrong;
     if wrong > 0 {
@@ -325,7 +333,7 @@ impl PullRow {
     }
 }
 
-fn tables(summary: &Summary, frames: &[FrameRow]) -> anyhow::Result<Vec<PageTable>> {
+fn tables(summary: &ValidationSummary, frames: &[RunFrameRow]) -> anyhow::Result<Vec<PageTable>> {
     let pulls = summary.pulls.named().into_iter().map(PullRow::of);
     let by_stars = summary.identification.by_stars.iter();
     [

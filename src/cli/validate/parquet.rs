@@ -9,13 +9,13 @@ use starpipe::study::validation::{FrameRecord, StarRecord, TableRow};
 use std::path::{Path, PathBuf};
 
 /// The parts in a run's directory.
-pub(super) struct Parts<'a> {
+pub(super) struct ParquetParts<'a> {
     directory: &'a Path,
     /// Number of parts that are known to be written.
     written: u64,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> ParquetParts<'a> {
     pub(super) fn new(directory: &'a Path) -> Self {
         let written = 0;
         Self { directory, written }

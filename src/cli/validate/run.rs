@@ -2,7 +2,7 @@
 
 use super::figures;
 use super::frames::RunFrames;
-use super::parquet::Parts;
+use super::parquet::ParquetParts;
 use super::shared::Shared;
 use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
@@ -14,7 +14,7 @@ use starpipe::study::StudyError;
 use starpipe::study::validation::store::{
     FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
-use starpipe::study::validation::{Protocol, Summary, Validator};
+use starpipe::study::validation::{ValidationProtocol, ValidationSummary, Validator};
 use std::path::Path;
 use std::time::Instant;
 
@@ -23,7 +23,7 @@ const RESULTS: [&str; 2] = ["summary.json", "summary.txt"];
 
 /// Time that the frames of this start took. It differs each time, so it has a file of its own.
 #[derive(Debug, Default, Serialize)]
-struct Timing {
+struct RunTiming {
     frames: u64,
     threads: usize,
     wall_s: f64,
@@ -34,8 +34,8 @@ struct Timing {
 }
 
 /// A complete run.
-pub(super) struct Run {
-    pub(super) summary: Summary,
+pub(super) struct ValidationRun {
+    pub(super) summary: ValidationSummary,
     /// What a page shows of its frames.
     pub(super) frames: RunFrames,
 }
@@ -43,9 +43,9 @@ pub(super) struct Run {
 /// Completes the run in `directory` and summarizes it.
 pub(super) fn run(
     directory: &Path,
-    protocol: &Protocol,
+    protocol: &ValidationProtocol,
     shared: &Shared,
-) -> Result<Run, CommandError> {
+) -> Result<ValidationRun, CommandError> {
     let validator = Validator::new(shared.indexed, protocol).map_err(|error| match error {
         StudyError::Scenario(_) | StudyError::NoLimit => CommandError::usage(error),
         other => CommandError::Failed(other.into()),
@@ -60,7 +60,7 @@ pub(super) fn run(
             shared.frames
         )));
     }
-    let mut parts = Parts::new(directory);
+    let mut parts = ParquetParts::new(directory);
     shared.progress.inc(done);
     shared.progress.reset_eta();
     if done < shared.frames {
@@ -73,7 +73,7 @@ pub(super) fn run(
         Some(most) => RunFrames::of(&tables, &validator, most)?,
         None => RunFrames::default(),
     };
-    Ok(Run { summary, frames })
+    Ok(ValidationRun { summary, frames })
 }
 
 /// A directory that holds something else is an error of the command line.
@@ -91,7 +91,7 @@ fn complete(
     directory: &Path,
     validator: &Validator,
     tables: &mut RunTables,
-    parts: &mut Parts,
+    parts: &mut ParquetParts,
     shared: &Shared,
 ) -> anyhow::Result<()> {
     let done = tables.done();
@@ -117,13 +117,13 @@ fn complete(
 fn simulate(
     validator: &Validator,
     tables: &mut RunTables,
-    parts: &mut Parts,
+    parts: &mut ParquetParts,
     shared: &Shared,
-) -> anyhow::Result<Timing> {
+) -> anyhow::Result<RunTiming> {
     let start = Instant::now();
-    let mut timing = Timing {
+    let mut timing = RunTiming {
         threads: shared.pool.current_num_threads(),
-        ..Timing::default()
+        ..RunTiming::default()
     };
     while tables.done() < shared.frames {
         simulate_part(validator, tables, shared, &mut timing)?;
@@ -142,7 +142,7 @@ fn simulate_part(
     validator: &Validator,
     tables: &mut RunTables,
     shared: &Shared,
-    timing: &mut Timing,
+    timing: &mut RunTiming,
 ) -> anyhow::Result<()> {
     let first = tables.done();
     let end = ((first / FRAMES_PER_PART + 1) * FRAMES_PER_PART).min(shared.frames);
@@ -163,7 +163,7 @@ fn simulate_part(
 }
 
 /// Writes the summary as JSON and text, and its figures.
-fn save(directory: &Path, summary: &Summary, shared: &Shared) -> anyhow::Result<()> {
+fn save(directory: &Path, summary: &ValidationSummary, shared: &Shared) -> anyhow::Result<()> {
     let texts = [json_indented(summary)?, summary.to_text()];
     let sheets = figures::of_run(summary);
     shared.write(directory, RESULTS.into_iter().zip(texts), sheets);

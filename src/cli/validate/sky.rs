@@ -5,11 +5,11 @@ use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::rows::{csv_table, json_indented};
-use crate::cli::plot::{Axis, BLUE, Layer, Marks, ORANGE, Panel, Sheet};
+use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use starpipe::ephemeris::observer::Site;
 use starpipe::pipeline::Workspace;
-use starpipe::study::night_sky::{FrameRow, SkyStudy, SkySummary, SkyTrial};
-use starpipe::study::validation::Protocol;
+use starpipe::study::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
+use starpipe::study::validation::ValidationProtocol;
 use starpipe::study::validation::store::claim_directory;
 use std::path::Path;
 
@@ -27,12 +27,12 @@ impl JournalRow for SkyTrial {
 /// Measures the frames that `directory` lacks, and writes tables of all.
 pub(super) fn run(
     directory: &Path,
-    base: &Protocol,
+    base: &ValidationProtocol,
     shared: &Shared,
 ) -> Result<(SkySummary, Vec<SkyTrial>), CommandError> {
     let [lat_deg, lon_deg, height_m] = SITE_DEG_M;
     let site = Site::new(lat_deg, lon_deg, height_m).map_err(CommandError::usage)?;
-    let protocol = Protocol {
+    let protocol = ValidationProtocol {
         site: Some(site),
         ..base.clone()
     };
@@ -95,7 +95,7 @@ fn save(
 
 /// Errors of the frames over what they depend on.
 pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
-    let dots = |value: fn(&FrameRow) -> Option<(f64, f64, f64)>| {
+    let dots = |value: fn(&TrialFrameRow) -> Option<(f64, f64, f64)>| {
         let dots = trials.iter().filter_map(|trial| value(&trial.frame));
         Marks::Dots(
             dots.map(|(x, y, sigma)| (x, y, [y - sigma, y + sigma]))
@@ -107,8 +107,8 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         x: Axis::of(x),
         y: Axis::of(y),
         layers: vec![
-            Layer::guide(Marks::Levels(vec![0.0])),
-            Layer::new("frames", BLUE, marks),
+            PlotLayer::guide(Marks::Levels(vec![0.0])),
+            PlotLayer::new("frames", BLUE, marks),
         ],
     };
     let zenith = dots(|row| {
@@ -149,8 +149,8 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
                 x: Axis::of("stated").within(0.0, 1.0),
                 y: Axis::of("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
-                    Layer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
-                    Layer::new("found", BLUE, Marks::Line(told.collect())),
+                    PlotLayer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
+                    PlotLayer::new("found", BLUE, Marks::Line(told.collect())),
                 ],
             },
         ],

@@ -7,7 +7,9 @@ use super::{figures, run};
 use crate::cli::exit::CommandError;
 use crate::cli::output::rows::{csv_table, json_indented};
 use starpipe::model::sensitivity::Spacing;
-use starpipe::study::validation::{Protocol, StudyParameter, StudyRow, Summary};
+use starpipe::study::validation::{
+    StudyParameter, StudyRow, ValidationProtocol, ValidationSummary,
+};
 use std::path::Path;
 
 /// One value of one parameter.
@@ -15,11 +17,14 @@ pub(super) struct StudyRun {
     parameter: StudyParameter,
     spacing: Spacing,
     value: f64,
-    protocol: Protocol,
+    protocol: ValidationProtocol,
 }
 
 /// The runs that the sweeps ask for, all of them valid.
-pub(super) fn runs(sweeps: &[StudySweep], base: &Protocol) -> Result<Vec<StudyRun>, CommandError> {
+pub(super) fn runs(
+    sweeps: &[StudySweep],
+    base: &ValidationProtocol,
+) -> Result<Vec<StudyRun>, CommandError> {
     let mut runs: Vec<StudyRun> = Vec::new();
     for sweep in sweeps {
         let name = sweep.parameter.name();
@@ -66,9 +71,9 @@ pub(super) fn run(
 
 /// Does runs one after the other, each in the directory of its name. Returns a row for each, and the frames that
 /// failed.
-pub(super) fn run_each<R, F: FnOnce(&Summary) -> R>(
+pub(super) fn run_each<R, F: FnOnce(&ValidationSummary) -> R>(
     directory: &Path,
-    cases: impl Iterator<Item = Result<(String, Protocol, F), CommandError>>,
+    cases: impl Iterator<Item = Result<(String, ValidationProtocol, F), CommandError>>,
     shared: &Shared,
 ) -> Result<(Vec<R>, FailedFrames), CommandError> {
     let (mut rows, mut failed) = (Vec::new(), FailedFrames::default());

@@ -71,14 +71,14 @@ struct NodeLine {
 
 /// A point among the nodes: the node before it, and how far on it is, in nodes.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct MeshPosition {
     row: usize,
     column: usize,
     across: f32,
     down: f32,
 }
 
-impl Place {
+impl MeshPosition {
     /// The nearest place between nodes.
     fn held(self) -> Self {
         Self {
@@ -294,10 +294,10 @@ impl Mesh {
     }
 
     #[inline]
-    fn place(&self, x: f32, y: f32) -> Place {
+    fn place(&self, x: f32, y: f32) -> MeshPosition {
         let (row, down) = Self::node(y, self.rows_per_px, self.grid.rows);
         let (column, across) = Self::node(x, self.columns_per_px, self.grid.columns);
-        Place {
+        MeshPosition {
             row,
             column,
             across,
@@ -307,8 +307,8 @@ impl Mesh {
 
     /// The value of a map at a place.
     #[inline]
-    fn blend(&self, map: &[f32], place: Place) -> f32 {
-        let Place {
+    fn blend(&self, map: &[f32], place: MeshPosition) -> f32 {
+        let MeshPosition {
             row,
             column,
             across,

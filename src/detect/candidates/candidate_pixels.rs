@@ -45,7 +45,7 @@ struct CandidateSpan {
 
 /// A span of pixels, some of them candidates.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Span<'a> {
+pub(super) struct PixelSpan<'a> {
     /// Column of the first pixel.
     pub x: u32,
     /// Row.
@@ -120,14 +120,14 @@ impl Candidates {
     }
 
     /// The spans that hold candidates, in reading order.
-    pub(super) fn spans(&self) -> impl Iterator<Item = Span<'_>> {
+    pub(super) fn spans(&self) -> impl Iterator<Item = PixelSpan<'_>> {
         let (mut values, mut adjacent) = (self.values.as_slice(), self.adjacent.as_slice());
         self.spans.iter().map(move |span| {
             let (of_span, rest) = values.split_at(span.length as usize);
             values = rest;
             let (tops, rest) = adjacent.split_at(span.maxima.count_ones() as usize);
             adjacent = rest;
-            Span {
+            PixelSpan {
                 x: span.x,
                 y: span.y,
                 values: of_span,

@@ -4,7 +4,7 @@
 use crate::base::interrupt::Interrupted;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::{
-    BLOCK_PX, Level, ReachedBlock, Samples, View, find_reaching, local_maxima,
+    BLOCK_PX, PixelLevel, ReachedBlock, Samples, View, find_reaching, local_maxima,
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
@@ -153,7 +153,7 @@ impl BandWorker {
 }
 
 /// Finds the pixels of the middle row from the threshold of their block on that no neighbor exceeds.
-fn find_maxima<T: Level>(rows: [&[T]; 3], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
+fn find_maxima<T: PixelLevel>(rows: [&[T]; 3], thresholds: &[f32], found: &mut Vec<ReachedBlock>) {
     find_reaching(rows[1], thresholds, found);
     for ReachedBlock { block, bits } in found {
         *bits &= local_maxima(rows.map(Some), *block * BLOCK_PX);

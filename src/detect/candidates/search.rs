@@ -9,7 +9,7 @@
 //! 4. Peaks that noise or the wing of a brighter star can explain are dropped.
 //! 5. Of the many peaks of a streak one is kept.
 
-use super::candidate_pixels::{Adjacent, Candidates, Span};
+use super::candidate_pixels::{Adjacent, Candidates, PixelSpan};
 use super::labelling::Labelling;
 use super::memory::check_count;
 use super::peak::{Peak, is_saturated, parabola_vertex};
@@ -105,7 +105,7 @@ impl PeakSearch {
     /// Adds those pixels of a span that are `bright`, as bits, and the peaks among them.
     fn add_runs(
         &mut self,
-        span: &Span<'_>,
+        span: &PixelSpan<'_>,
         mut bright: u64,
         heights: &[f32],
         frame: &View<'_>,
@@ -187,7 +187,7 @@ impl PeakSearch {
 fn reaching(
     mesh: &Mesh,
     nodes: &[[f32; 2]],
-    span: &Span,
+    span: &PixelSpan,
     threshold: f32,
     heights: &mut [f32],
 ) -> u64 {

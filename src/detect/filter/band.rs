@@ -3,7 +3,7 @@
 use super::convolution::{VECTOR_PX, normalise, sum_along_columns, sum_along_row};
 use super::kernel::Kernel;
 use crate::detect::background::{Mesh, Piece, SlopePixels};
-use crate::detect::pixels::{Aligned, LINE, PixelRows, View};
+use crate::detect::pixels::{AlignedBuffer, LINE, PixelRows, View};
 use crate::detect::psf::MAX_TAPS;
 use arrayvec::ArrayVec;
 use std::ops::Range;
@@ -22,15 +22,15 @@ pub(crate) struct FilteredBand {
     stride: usize,
     /// Rows of the frame that the band holds.
     rows: Range<usize>,
-    values: Aligned,
+    values: AlignedBuffer,
     /// A normalised row from `lead` on, padded with zeros over at least the kernel's radius.
-    padded_row: Aligned,
+    padded_row: AlignedBuffer,
     lead: usize,
     /// Ring buffer of rows filtered along x: row y is in slot y modulo their number.
-    ring: Aligned,
+    ring: AlignedBuffer,
     /// The row of the frame after the last one in the ring.
     next_row: usize,
-    zeros: Aligned,
+    zeros: AlignedBuffer,
     /// Columns where the border cuts off the kernel, and the factor for each.
     border_factors: Vec<(usize, f32)>,
     pieces: Vec<Piece>,

@@ -8,7 +8,7 @@ use super::frame_maps::FrameMaps;
 use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance};
 use super::light::spot_gradient;
 use super::normal::NormalEquations;
-use super::parameters::{Fit, FitConfig, ONE_SPOT, SpotEstimate};
+use super::parameters::{FitConfig, ONE_SPOT, SpotEstimate, SpotFit};
 use super::sums::{WindowPixels, flux_variance_of, variance_of};
 use super::window::{Window, window_radius};
 use crate::detect::psf::{Cumulative, ProfilePart};
@@ -46,7 +46,7 @@ struct ActiveFit {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BatchFitter {
     lanes: [Option<ActiveFit>; BATCH],
-    fits: [Fit; BATCH],
+    fits: [SpotFit; BATCH],
     windows: [Window; BATCH],
     /// Side of the windows, in pixels.
     side: usize,
@@ -98,7 +98,7 @@ impl BatchFitter {
         maps: &FrameMaps<'_>,
         starts: impl Iterator<Item = BatchStart>,
         config: &FitConfig,
-        on_fit: impl FnMut(usize, Option<Fit>, &Window),
+        on_fit: impl FnMut(usize, Option<SpotFit>, &Window),
     ) {
         let cut = |start: &BatchStart, window: &mut Window| {
             maps.cut_out(&[start.spot], window_radius(start.spot_px), window);
@@ -113,7 +113,7 @@ impl BatchFitter {
         mut cut: impl FnMut(&BatchStart, &mut Window),
         mut starts: impl Iterator<Item = BatchStart>,
         config: &FitConfig,
-        mut on_fit: impl FnMut(usize, Option<Fit>, &Window),
+        mut on_fit: impl FnMut(usize, Option<SpotFit>, &Window),
     ) {
         self.side = 2 * window_radius(config.spot_px) + 1;
         self.data.clear();
@@ -169,9 +169,9 @@ impl BatchFitter {
             return;
         };
         let fit = &mut self.fits[lane];
-        *fit = Fit {
+        *fit = SpotFit {
             spot_px: start.spot_px,
-            ..Fit::default()
+            ..SpotFit::default()
         };
         fit.spots.push(start.spot);
         let window = &mut self.windows[lane];
@@ -442,7 +442,7 @@ mod tests {
         }
     }
 
-    fn assert_agree(star: usize, batch: &Fit, single: &Fit) {
+    fn assert_agree(star: usize, batch: &SpotFit, single: &SpotFit) {
         let (a, b) = (batch.spots[0], single.spots[0]);
         let off = (a.x - b.x).abs().max((a.y - b.y).abs());
         assert!(off < 1e-3 * b.sigma_x, "star {star}: {off} px");

@@ -3,7 +3,7 @@
 use super::batch::BatchFitter;
 use super::fitter::Fitter;
 use super::frame_maps::FrameMaps;
-use super::parameters::{Fit, FitConfig, NoiseModel, SpotEstimate};
+use super::parameters::{FitConfig, NoiseModel, SpotEstimate, SpotFit};
 use super::window::Window;
 
 /// Buffers of the fits of one thread.
@@ -27,7 +27,7 @@ impl FitBuffers {
         start: &[SpotEstimate],
         beyond: &[SpotEstimate],
         noise: NoiseModel,
-    ) -> Fit {
+    ) -> SpotFit {
         let config = FitConfig {
             spot_px: maps.spot_px,
             free_size: false,
@@ -58,7 +58,7 @@ impl FitBuffers {
         beyond: &[SpotEstimate],
         spot_px: f64,
         noise: NoiseModel,
-    ) -> Fit {
+    ) -> SpotFit {
         const MAX_WINDOWS: usize = 3;
         let mut config = FitConfig {
             spot_px,
@@ -67,7 +67,7 @@ impl FitBuffers {
         };
         let Self { fitter, window, .. } = self;
         let mut radius = maps.window_radius(spot_px);
-        let mut fit = Fit::default();
+        let mut fit = SpotFit::default();
         for _ in 0..MAX_WINDOWS {
             maps.cut_out(&[start], radius, window);
             fitter.subtract(window, beyond, maps.spot_px);

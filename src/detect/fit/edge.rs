@@ -40,9 +40,9 @@ pub(super) struct Edge {
 impl Edge {
     /// The edge that a ring shows, if it does; with the noise of a pixel.
     pub fn in_ring(ring: &[RingPixel], noise_adu: f64) -> Option<Self> {
-        let limits = Limits::of(ring)?;
+        let limits = LevelRange::of(ring)?;
         let across = limits.steepest(ring)?;
-        let along_px = Profile::of(ring, across, limits).edge(noise_adu)?;
+        let along_px = RingProfile::of(ring, across, limits).edge(noise_adu)?;
         Some(Self {
             away: across.map(|part| part * along_px.signum()),
             distance_px: along_px.abs(),
@@ -60,12 +60,12 @@ impl Edge {
 
 /// The values of most pixels, without the light of stars.
 #[derive(Debug, Clone, Copy)]
-struct Limits {
+struct LevelRange {
     low: f64,
     high: f64,
 }
 
-impl Limits {
+impl LevelRange {
     /// `None` for an empty ring.
     fn of(ring: &[RingPixel]) -> Option<Self> {
         /// Share of the pixels that may be of stars.
@@ -104,7 +104,7 @@ impl Limits {
 }
 
 /// The pixels of a ring along a direction, in bins of a pixel.
-struct Profile {
+struct RingProfile {
     /// Of each that has pixels.
     bins: ArrayVec<Bin, BINS>,
 }
@@ -122,15 +122,15 @@ struct Bin {
 }
 
 /// A step in a profile.
-struct Step {
+struct EdgeStep {
     /// Its height, in ADU.
     height: f64,
     /// Squared distances of the means of the bins from the profile with it.
     misfit: f64,
 }
 
-impl Profile {
-    fn of(ring: &[RingPixel], across: [f64; 2], limits: Limits) -> Self {
+impl RingProfile {
+    fn of(ring: &[RingPixel], across: [f64; 2], limits: LevelRange) -> Self {
         let middle = 0.5 * BINS as f64;
         let mut bins = [Bin::default(); BINS];
         for pixel in ring {
@@ -189,9 +189,9 @@ impl Profile {
     }
 
     /// A step at a place, above a line. `None` where there is nothing on one side of it.
-    fn with_step(&self, at: f64) -> Option<Step> {
+    fn with_step(&self, at: f64) -> Option<EdgeStep> {
         let fitted = self.fitted(|place| Vector3::new(1.0, place, f64::from(u8::from(place > at))));
-        fitted.map(|(terms, misfit)| Step {
+        fitted.map(|(terms, misfit)| EdgeStep {
             height: terms[2],
             misfit,
         })

@@ -5,7 +5,7 @@ use super::light::{GaussianLight, add_light};
 use super::mixture_light::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
 use super::parameters::{
-    Fit, FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, SpotGroup,
+    FitConfig, MAX_PARAMETERS, MAX_SPOTS, NoiseModel, ONE_SPOT, SpotEstimate, SpotFit, SpotGroup,
     TWO_SPOTS,
 };
 use super::sums::{SumBuffers, WindowPixels, add_pixels, flux_variance};
@@ -47,7 +47,7 @@ impl Fitter {
     /// Fits at most [`MAX_SPOTS`] spots to the pixels of `window`, beginning at `start`.
     ///
     /// Without convergence the result is `start`, with the standard errors for these parameters.
-    pub fn fit(&mut self, window: &Window, start: &[SpotEstimate], config: &FitConfig) -> Fit {
+    pub fn fit(&mut self, window: &Window, start: &[SpotEstimate], config: &FitConfig) -> SpotFit {
         let start = &start[..start.len().min(MAX_SPOTS)];
         match start.len() {
             1 => self.fit_up_to::<ONE_SPOT>(window, start, config, f64::INFINITY),
@@ -63,7 +63,7 @@ impl Fitter {
         start: &[SpotEstimate; 2],
         config: &FitConfig,
         most_chi2: f64,
-    ) -> Fit {
+    ) -> SpotFit {
         self.fit_up_to::<TWO_SPOTS>(window, start, config, most_chi2)
     }
 
@@ -74,15 +74,15 @@ impl Fitter {
         start: &[SpotEstimate],
         config: &FitConfig,
         most_chi2: f64,
-    ) -> Fit {
+    ) -> SpotFit {
         /// Steps before the chi² that the linear equations predict tells where a fit leads to,
         const PATIENCE: usize = 3;
         /// within this factor.
         const MISSED: f64 = 1.5;
-        let mut fit = Fit {
+        let mut fit = SpotFit {
             spots: start.iter().copied().collect(),
             spot_px: config.spot_px,
-            ..Fit::default()
+            ..SpotFit::default()
         };
         for step in 0..MAX_STEPS {
             let mut normal: NormalEquations<N> = self.linearise(window, &fit, config);
@@ -99,7 +99,12 @@ impl Fitter {
 
     /// The initial guess of a spot that cannot be fitted, with the standard errors for these
     /// parameters.
-    pub fn unfitted(&mut self, window: &Window, start: SpotEstimate, config: &FitConfig) -> Fit {
+    pub fn unfitted(
+        &mut self,
+        window: &Window,
+        start: SpotEstimate,
+        config: &FitConfig,
+    ) -> SpotFit {
         self.unfitted_up_to::<ONE_SPOT>(window, &[start], config)
     }
 
@@ -109,11 +114,11 @@ impl Fitter {
         window: &Window,
         start: &[SpotEstimate],
         config: &FitConfig,
-    ) -> Fit {
-        let mut fit = Fit {
+    ) -> SpotFit {
+        let mut fit = SpotFit {
             spots: start.iter().copied().collect(),
             spot_px: config.spot_px,
-            ..Fit::default()
+            ..SpotFit::default()
         };
         let mut normal: NormalEquations<N> = self.linearise(window, &fit, config);
         let known = if normal.pixels > 0 {
@@ -134,10 +139,10 @@ impl Fitter {
         spot: SpotEstimate,
         config: &FitConfig,
     ) -> (f64, usize) {
-        let fit = Fit {
+        let fit = SpotFit {
             spots: SpotGroup::from_iter([spot]),
             spot_px: config.spot_px,
-            ..Fit::default()
+            ..SpotFit::default()
         };
         let mut normal: NormalEquations<ONE_SPOT> = self.linearise(window, &fit, config);
         let fitted = config.parameter_count(1);
@@ -154,7 +159,7 @@ impl Fitter {
     /// spot model.
     ///
     /// Call it right after [`Self::fit`], with the same window.
-    pub fn set_flux_noise(&mut self, window: &Window, fit: &mut Fit, config: &FitConfig) {
+    pub fn set_flux_noise(&mut self, window: &Window, fit: &mut SpotFit, config: &FitConfig) {
         if !fit.converged {
             return;
         }
@@ -187,7 +192,7 @@ impl Fitter {
     fn set_flux_noise_up_to<const N: usize>(
         &mut self,
         window: &Window,
-        fit: &mut Fit,
+        fit: &mut SpotFit,
         noise_only: &FitConfig,
     ) {
         let mut normal: NormalEquations<N> = self.linearise(window, fit, noise_only);
@@ -262,7 +267,7 @@ impl Fitter {
     pub fn compare(
         &mut self,
         window: &Window,
-        fit: &Fit,
+        fit: &SpotFit,
     ) -> impl Iterator<Item = (f64, f64)> + Clone {
         let mut light = std::mem::take(&mut self.light);
         light.clear();
@@ -281,7 +286,7 @@ impl Fitter {
     }
 
     /// Unit vector along the major axis of the light around the first spot; `None` without light.
-    pub fn major_axis(&self, window: &Window, fit: &Fit) -> Option<(f64, f64)> {
+    pub fn major_axis(&self, window: &Window, fit: &SpotFit) -> Option<(f64, f64)> {
         let spot = fit.spots[0];
         let (x, y) = (spot.x - window.x0 as f64, spot.y - window.y0 as f64);
         let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
@@ -305,7 +310,7 @@ impl Fitter {
     pub fn factorised<'a>(
         &'a mut self,
         window: &'a Window,
-        fit: &Fit,
+        fit: &SpotFit,
         config: &FitConfig,
     ) -> Option<(CholeskyFactor<ONE_SPOT>, AnyLight<'a>, WindowPixels<'a>)> {
         let [spot] = fit.spots.as_slice() else {
@@ -334,7 +339,7 @@ impl Fitter {
     fn linearise<const N: usize>(
         &mut self,
         window: &Window,
-        fit: &Fit,
+        fit: &SpotFit,
         config: &FitConfig,
     ) -> NormalEquations<N> {
         let mut normal = NormalEquations::empty();

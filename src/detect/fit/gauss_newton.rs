@@ -1,7 +1,7 @@
 //! One Gauss-Newton step of a fit: solution of the normal equations, convergence, standard errors.
 
 use super::normal::NormalEquations;
-use super::parameters::{Fit, FitConfig, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate};
+use super::parameters::{FitConfig, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotFit};
 use super::window::Window;
 
 /// Maximum number of steps of a fit.
@@ -56,7 +56,7 @@ pub(super) enum StepOutcome {
 pub(super) fn add_background_map<const N: usize>(
     normal: &mut NormalEquations<N>,
     window: &Window,
-    fit: &Fit,
+    fit: &SpotFit,
 ) {
     let b = 3 * fit.spots.len();
     let weight = 1.0 / (window.background_error * window.background_error);
@@ -67,7 +67,7 @@ pub(super) fn add_background_map<const N: usize>(
 
 /// Solves the equations at `fit` and takes step number `step`; completes the fit if it converged.
 pub(super) fn advance<const N: usize>(
-    fit: &mut Fit,
+    fit: &mut SpotFit,
     start: &[SpotEstimate],
     normal: &mut NormalEquations<N>,
     step: usize,
@@ -105,7 +105,7 @@ pub(super) fn advance<const N: usize>(
 }
 
 /// Whether a spot is farther from its initial position than its width, or its flux is not finite.
-fn has_strayed(fit: &Fit, start: &[SpotEstimate], config: &FitConfig) -> bool {
+fn has_strayed(fit: &SpotFit, start: &[SpotEstimate], config: &FitConfig) -> bool {
     let reach2 = (1.0 + config.spot_px).powi(2);
     fit.spots.iter().zip(start).any(|(now, then)| {
         let distance2 = (now.x - then.x).powi(2) + (now.y - then.y).powi(2);
@@ -114,7 +114,7 @@ fn has_strayed(fit: &Fit, start: &[SpotEstimate], config: &FitConfig) -> bool {
 }
 
 /// Adds a step, shortened to [`MAX_STEP_PX`]; returns the length of the longest full move in px.
-fn apply(fit: &mut Fit, change: &[f64], config: &FitConfig) -> f64 {
+fn apply(fit: &mut SpotFit, change: &[f64], config: &FitConfig) -> f64 {
     let spots = fit.spots.len();
     let squares = (0..spots).map(|i| change[3 * i].powi(2) + change[3 * i + 1].powi(2));
     let mut length = squares.fold(0.0, f64::max).sqrt();
@@ -139,7 +139,7 @@ fn apply(fit: &mut Fit, change: &[f64], config: &FitConfig) -> f64 {
 ///
 /// `fitted` parameters were fitted; of these and the size, the first `known` are determined.
 pub(super) fn finish<const N: usize>(
-    fit: &mut Fit,
+    fit: &mut SpotFit,
     normal: &NormalEquations<N>,
     fitted: usize,
     known: usize,

@@ -37,7 +37,7 @@ impl MixtureImage {
         let place_px = [x_px - window.x0 as f64, y_px - window.y0 as f64];
         let size = window.size();
         if psf.table.is_empty() {
-            let window = LobeWindow {
+            let window = DrawnSpot {
                 place_px,
                 scale,
                 size,
@@ -62,7 +62,7 @@ impl MixtureImage {
 
 /// Where a spot is drawn.
 #[derive(Debug, Clone, Copy)]
-struct LobeWindow {
+struct DrawnSpot {
     /// The spot in the window, in pixels.
     place_px: [f64; 2],
     /// Its size over that of the PSF.
@@ -75,11 +75,11 @@ struct LobeWindow {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_lobes<const PARTS: usize>(
     psf: &LocalPsf,
-    window: &LobeWindow,
+    window: &DrawnSpot,
     profiles: &mut NarrowProfiles,
     into: &mut [ShareGroup],
 ) {
-    let LobeWindow {
+    let DrawnSpot {
         place_px: [x_px, y_px],
         scale,
         size,

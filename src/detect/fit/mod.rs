@@ -33,7 +33,7 @@ pub(crate) use frame_maps::FrameMaps;
 pub(crate) use light::{GaussianLight, SpotLight, linearise};
 pub(crate) use normal::{CholeskyFactor, NormalEquations};
 pub(crate) use parameters::{
-    Fit, FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotGroup,
+    FitConfig, MAX_SPOTS, NoiseModel, ONE_SPOT, SPOT_RANGE_PX, SpotEstimate, SpotFit, SpotGroup,
 };
 pub(crate) use sums::{BLOCK, Block, WindowPixels, products_in_lanes, sum_of};
 pub(crate) use window::{Window, window_radius};

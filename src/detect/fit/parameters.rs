@@ -74,7 +74,7 @@ impl FitConfig {
 
 /// Result of a fit.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Fit {
+pub(crate) struct SpotFit {
     /// In the order of the initial guesses.
     pub spots: SpotGroup,
     /// Background above the map, in ADU.

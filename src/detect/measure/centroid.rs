@@ -2,7 +2,7 @@
 
 use crate::base::coords::PixelPoint;
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitBuffers, FrameMaps, NoiseModel, Window};
+use crate::detect::fit::{FitBuffers, FrameMaps, NoiseModel, SpotFit, Window};
 
 /// Grey levels count above this many standard deviations of the background noise.
 const GREY_THRESHOLD_SIGMA: f64 = 3.0;
@@ -20,7 +20,7 @@ const GREY_THRESHOLD_SIGMA: f64 = 3.0;
 pub(crate) fn grey_weighted(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
-    fit: &Fit,
+    fit: &SpotFit,
     detection: &mut Detection,
     buffers: &mut FitBuffers,
 ) {

@@ -4,14 +4,14 @@ use super::saturated_area::SaturatedArea;
 use crate::base::coords::PixelPoint;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::{Detection, DetectionFlags};
-use crate::detect::fit::{Fit, FrameMaps, NoiseModel, SpotEstimate};
+use crate::detect::fit::{FrameMaps, NoiseModel, SpotEstimate, SpotFit};
 use crate::detect::pixels::View;
 
 /// The detection of a source in coordinates of the view, without the flags of its shape.
 pub(super) fn detection_of(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
-    fit: &Fit,
+    fit: &SpotFit,
     peak: &Peak,
     region: &Region,
 ) -> Detection {
@@ -49,7 +49,7 @@ pub(super) fn detection_of(
 fn best_estimate(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
-    fit: &Fit,
+    fit: &SpotFit,
     peak: &Peak,
     region: &Region,
 ) -> SpotEstimate {

@@ -13,7 +13,7 @@ use crate::detect::candidates::{Peak, Region};
 use crate::detect::config::CentroidMethod;
 use crate::detect::detection::Detection;
 use crate::detect::fit::{
-    BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotGroup,
+    BatchStart, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit, SpotGroup,
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
@@ -179,7 +179,7 @@ impl Measurement<'_> {
     fn measure(
         &self,
         surroundings: &PeakSurroundings<'_>,
-        fitted: Option<Fit>,
+        fitted: Option<SpotFit>,
         buffers: &mut FitBuffers,
         out: &mut Vec<Detection>,
     ) -> Option<SpotEstimate> {
@@ -235,7 +235,7 @@ impl Measurement<'_> {
         peak: &Peak,
         beyond: &[SpotEstimate],
         buffers: &mut FitBuffers,
-    ) -> Fit {
+    ) -> SpotFit {
         let mut fit = if peak.saturated && start.len() == 1 {
             let size_px = 1.5 * self.maps.spot_px;
             buffers.fit_free_size(&self.maps, start[0], beyond, size_px, self.noise)
@@ -254,7 +254,7 @@ impl Measurement<'_> {
     /// Raises the errors of a saturated star to what its residuals tell: the form of the wings is
     /// not measured on the other stars. Nothing is left of a fit to what is too sharp for a star:
     /// what was fitted are a few dark pixels around the core, and the flux is a guess.
-    fn judge_saturated(&self, fit: &mut Fit) {
+    fn judge_saturated(&self, fit: &mut SpotFit) {
         /// Smallest size of a star over that of the others: optics and focus change over the frame.
         const MIN_RELATIVE_SIZE: f64 = 0.6;
         fit.converged &= fit.spot_px >= MIN_RELATIVE_SIZE * self.maps.spot_px;
@@ -273,7 +273,7 @@ impl Measurement<'_> {
     /// round spot may settle anywhere along it. Where they agree the fit is the more exact.
     fn center_elongated(
         &self,
-        fit: &Fit,
+        fit: &SpotFit,
         peak: &Peak,
         detection: &mut Detection,
         buffers: &mut FitBuffers,
@@ -309,7 +309,7 @@ impl Measurement<'_> {
     /// Moves a saturated star from the centre of its wings, which are all that was fitted, to its
     /// core where the two disagree: its spot is lopsided (coma), and of the stars that are not
     /// saturated hardly more than the core stands out.
-    fn move_to_core(&self, fit: &mut Fit, peak: &Peak) {
+    fn move_to_core(&self, fit: &mut SpotFit, peak: &Peak) {
         /// Distance of the two that is significant, in standard errors.
         const SIGNIFICANT_SIGMA: f64 = 3.0;
         /// The core of a star whose charge ran along a column is longer than this, over its
@@ -341,11 +341,11 @@ impl Measurement<'_> {
     /// Returns the pair with the spot of this peak first.
     fn add_companion(
         &self,
-        mut pair: Fit,
+        mut pair: SpotFit,
         surroundings: &PeakSurroundings<'_>,
         buffers: &mut FitBuffers,
         out: &mut Vec<Detection>,
-    ) -> Fit {
+    ) -> SpotFit {
         let peak = surroundings.peak();
         let is_others = |spot| surroundings.has_other_at(spot, self.touching_px());
         if is_others(pair.spots[0]) {
@@ -400,7 +400,7 @@ impl Measurement<'_> {
     /// frame.
     fn finish(
         &self,
-        fit: &Fit,
+        fit: &SpotFit,
         detection: &mut Detection,
         buffers: &mut FitBuffers,
         out: &mut Vec<Detection>,

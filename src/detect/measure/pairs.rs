@@ -4,7 +4,7 @@
 //! up to four spot sizes away.
 
 use crate::detect::candidates::{Peak, Region};
-use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
+use crate::detect::fit::{FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit};
 
 /// A bright single source is tried as a pair where it is too wide, fits badly or is elongated.
 struct PairCriteria;
@@ -27,7 +27,7 @@ impl PairCriteria {
 }
 
 /// Whether a source may be a close pair, in a frame whose stars are round.
-pub(super) fn may_be_pair(fit: &Fit, peak: &Peak, region: &Region, spot_px: f64) -> bool {
+pub(super) fn may_be_pair(fit: &SpotFit, peak: &Peak, region: &Region, spot_px: f64) -> bool {
     let is_wide = fit.size_excess_px > PairCriteria::MIN_EXCESS_SIGMA * fit.size_error_px
         && fit.size_excess_px > PairCriteria::MIN_EXCESS * spot_px;
     let is_sharp = fit.size_excess_px < 0.0 && !peak.saturated;
@@ -50,7 +50,7 @@ impl PairFitter<'_> {
     /// A fit of two spots where these explain the source well and one spot does not.
     ///
     /// Where there is no pair, the window of `fit` is restored in `buffers`.
-    pub fn fit(&self, fit: &Fit, buffers: &mut FitBuffers) -> Option<Fit> {
+    pub fn fit(&self, fit: &SpotFit, buffers: &mut FitBuffers) -> Option<SpotFit> {
         buffers.kept_window.copy_from(&buffers.window);
         let along_axis = self.start_along_axis(fit, buffers)?;
         let pair = self.fit_from(&along_axis, fit, buffers).or_else(|| {
@@ -64,7 +64,7 @@ impl PairFitter<'_> {
     }
 
     /// Initial guess: two equal spots on the major axis of the light.
-    fn start_along_axis(&self, fit: &Fit, buffers: &FitBuffers) -> Option<[SpotEstimate; 2]> {
+    fn start_along_axis(&self, fit: &SpotFit, buffers: &FitBuffers) -> Option<[SpotEstimate; 2]> {
         let axis = buffers.fitter.major_axis(&buffers.window, fit)?;
         let half_px = 1.2 * self.maps.width_px();
         let spot = fit.spots[0];
@@ -79,7 +79,7 @@ impl PairFitter<'_> {
     /// Initial guess: the fitted spot, and another at the brightest residual.
     fn start_from_residual(
         &self,
-        fit: &Fit,
+        fit: &SpotFit,
         buffers: &mut FitBuffers,
     ) -> Option<[SpotEstimate; 2]> {
         /// Flux of a spot over that in its brightest 3x3 pixels, roughly.
@@ -118,9 +118,9 @@ impl PairFitter<'_> {
     fn fit_from(
         &self,
         start: &[SpotEstimate; 2],
-        fit: &Fit,
+        fit: &SpotFit,
         buffers: &mut FitBuffers,
-    ) -> Option<Fit> {
+    ) -> Option<SpotFit> {
         /// Largest chi² of two spots over that of one.
         const MAX_CHI2_OF_ONE: f64 = 0.5;
         let config = FitConfig {
@@ -148,7 +148,7 @@ impl PairFitter<'_> {
     }
 
     /// Whether both spots are significant and apart, and the residuals are noise.
-    fn is_well_fitted(&self, fit: &Fit) -> bool {
+    fn is_well_fitted(&self, fit: &SpotFit) -> bool {
         /// Minimum flux of both spots over its standard error.
         const MIN_FLUX_SIGMA: f64 = 5.0;
         let Some(&[a, b]) = fit.spots.first_chunk::<2>() else {

@@ -14,7 +14,7 @@ use super::star_shape::StarShape;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::contrast::HOT_PIXEL_PX;
 use crate::detect::detection::Detection;
-use crate::detect::fit::{Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate};
+use crate::detect::fit::{FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit};
 
 /// Size of a star's spot, over that of the frame's spot.
 struct StarSize;
@@ -63,7 +63,7 @@ pub(super) fn flag_size(
     maps: &FrameMaps<'_>,
     shape: &StarShape,
     peak: &Peak,
-    fit: &Fit,
+    fit: &SpotFit,
     detection: &mut Detection,
     buffers: &mut FitBuffers,
 ) {
@@ -89,7 +89,12 @@ fn imperfection(maps: &FrameMaps<'_>, peak: &Peak, spot: &SpotEstimate) -> f64 {
 }
 
 /// Whether a single pixel explains the source better than any star does.
-fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
+fn is_hot_pixel(
+    maps: &FrameMaps<'_>,
+    peak: &Peak,
+    fit: &SpotFit,
+    buffers: &mut FitBuffers,
+) -> bool {
     /// Maximum deviation of a true star's chi² difference, in standard deviations.
     const STAR_SIGMA: f64 = 2.5;
     let spot = fit.spots[0];
@@ -101,14 +106,14 @@ fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitB
     };
     let correlation2 = maps.correlation_at(spot.x, spot.y).powi(2);
     let allowed = imperfection(maps, peak, &spot);
-    let is_single = |star: &Fit, buffers: &mut FitBuffers| {
+    let is_single = |star: &SpotFit, buffers: &mut FitBuffers| {
         let [difference, distance2] =
             compare_with_one_pixel(star, buffers).map(|v| v / correlation2);
         let is_unlike_star = difference + distance2 > STAR_SIGMA * 2.0 * distance2.sqrt();
         difference > allowed && is_unlike_star
     };
     // Where a sharp star that is not fitted is better than a single pixel, a fitted one is, too.
-    let unfitted = Fit {
+    let unfitted = SpotFit {
         spot_px: config.spot_px,
         ..fit.clone()
     };
@@ -120,7 +125,7 @@ fn is_hot_pixel(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitB
 }
 
 /// Chi² of a star less that of all light in one pixel, and the squared distance of the two models.
-fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
+fn compare_with_one_pixel(star: &SpotFit, buffers: &mut FitBuffers) -> [f64; 2] {
     let FitBuffers { fitter, window, .. } = buffers;
     let (mut difference, mut distance2) = (0.0, 0.0);
     let mut brightest = (0.0, 0.0);
@@ -140,7 +145,7 @@ fn compare_with_one_pixel(star: &Fit, buffers: &mut FitBuffers) -> [f64; 2] {
 
 /// Whether a much wider spot than the frame's explains the source much better: one of the largest
 /// size that a star has is fitted, and would be larger still, which would lower chi² (a score test).
-fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &Fit, buffers: &mut FitBuffers) -> bool {
+fn is_extended(maps: &FrameMaps<'_>, peak: &Peak, fit: &SpotFit, buffers: &mut FitBuffers) -> bool {
     let spot = fit.spots[0];
     let spot_px = StarSize::MAX * maps.spot_px;
     let config = FitConfig {

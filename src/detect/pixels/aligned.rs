@@ -9,12 +9,12 @@ pub(crate) const LINE: usize = LINE_BYTES / size_of::<f32>();
 
 /// A buffer that begins at a cache line.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Aligned {
+pub(crate) struct AlignedBuffer {
     buffer: Vec<f32>,
     start: usize,
 }
 
-impl Aligned {
+impl AlignedBuffer {
     /// Grows to at least `length` values; the values so far are kept.
     pub fn grow(&mut self, length: usize) {
         if self.len() >= length {
@@ -27,7 +27,7 @@ impl Aligned {
     }
 }
 
-impl Deref for Aligned {
+impl Deref for AlignedBuffer {
     type Target = [f32];
 
     fn deref(&self) -> &[f32] {
@@ -35,7 +35,7 @@ impl Deref for Aligned {
     }
 }
 
-impl DerefMut for Aligned {
+impl DerefMut for AlignedBuffer {
     fn deref_mut(&mut self) -> &mut [f32] {
         &mut self.buffer[self.start..]
     }
@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn values_are_kept_as_the_buffer_grows() {
-        let mut buffer = Aligned::default();
+        let mut buffer = AlignedBuffer::default();
         for length in [3, 100, 100, 5000] {
             buffer.grow(length);
             assert!(buffer.len() >= length);

@@ -56,7 +56,7 @@ impl ReachedBlock {
 }
 
 /// A value of a pixel that can be compared with a threshold.
-pub(crate) trait Level: Copy + PartialOrd {
+pub(crate) trait PixelLevel: Copy + PartialOrd {
     /// No value is lower.
     const LOWEST: Self;
     /// The least value that reaches the threshold; `None` if no value does.
@@ -71,7 +71,7 @@ fn whole_from(threshold: f32) -> Option<u32> {
     (!threshold.is_nan()).then(|| below.saturating_add(above))
 }
 
-impl Level for u8 {
+impl PixelLevel for u8 {
     const LOWEST: Self = 0;
 
     #[inline(always)]
@@ -80,7 +80,7 @@ impl Level for u8 {
     }
 }
 
-impl Level for u16 {
+impl PixelLevel for u16 {
     const LOWEST: Self = 0;
 
     #[inline(always)]
@@ -89,7 +89,7 @@ impl Level for u16 {
     }
 }
 
-impl Level for f32 {
+impl PixelLevel for f32 {
     const LOWEST: Self = f32::NEG_INFINITY;
 
     #[inline(always)]
@@ -101,7 +101,7 @@ impl Level for f32 {
 /// Finds the blocks of `row` with pixels of at least the threshold of their block; NaN is below
 /// any.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-pub(crate) fn find_reaching<T: Level>(
+pub(crate) fn find_reaching<T: PixelLevel>(
     row: &[T],
     thresholds: &[f32],
     found: &mut Vec<ReachedBlock>,

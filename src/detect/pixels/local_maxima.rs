@@ -1,6 +1,6 @@
 //! Local maxima of a row, a block of columns at a time.
 
-use super::blocks::{BLOCK_PX, Level, packed};
+use super::blocks::{BLOCK_PX, PixelLevel, packed};
 use multiversion::multiversion;
 
 /// The columns of a block, and one on either side.
@@ -10,13 +10,13 @@ pub(crate) type Widened<T> = [T; BLOCK_PX + 2];
 /// above and below: one bit for each column, the lowest for the first. No neighbor of a maximum is
 /// higher; of equal pixels the first in reading order counts. Nothing is beyond the border, and NaN is
 /// no neighbor. The bits of NaN pixels, and of columns beyond the row, mean nothing.
-pub(crate) fn local_maxima<T: Level>(rows: [Option<&[T]>; 3], first: usize) -> u64 {
+pub(crate) fn local_maxima<T: PixelLevel>(rows: [Option<&[T]>; 3], first: usize) -> u64 {
     with_widened(rows, first, |rows| mark_maxima(rows))
 }
 
 /// Calls `mark` with the columns of the block that begins with `first`, and one on either side; of
 /// the lowest value where there are none.
-pub(crate) fn with_widened<T: Level, R>(
+pub(crate) fn with_widened<T: PixelLevel, R>(
     rows: [Option<&[T]>; 3],
     first: usize,
     mark: impl Fn([&Widened<T>; 3]) -> R,
@@ -37,7 +37,7 @@ pub(crate) fn with_widened<T: Level, R>(
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn mark_maxima<T: Level>([above, row, below]: [&Widened<T>; 3]) -> u64 {
+fn mark_maxima<T: PixelLevel>([above, row, below]: [&Widened<T>; 3]) -> u64 {
     let mut marks = [0u8; BLOCK_PX];
     for (x, mark) in marks.iter_mut().enumerate() {
         let value = row[x + 1];

@@ -7,9 +7,9 @@ mod reduce;
 mod samples;
 mod view;
 
-pub(crate) use aligned::{Aligned, LINE};
+pub(crate) use aligned::{AlignedBuffer, LINE};
 pub(crate) use blocks::{
-    BLOCK_PX, BlockMaxima, Level, ReachedBlock, bits_of, find_reaching, packed,
+    BLOCK_PX, BlockMaxima, PixelLevel, ReachedBlock, bits_of, find_reaching, packed,
 };
 pub(crate) use local_maxima::{Widened, local_maxima, with_widened};
 pub(crate) use reduce::{

@@ -5,8 +5,8 @@
 //! Anderson & King 2000, PASP 112, 1360, doi 10.1086/316632, for the effective PSF and its change
 //! over the field.
 
-use super::gaussian::{Lobe, MAX_WINDOW_PX};
-use super::table::{LobeExtent, PsfTable};
+use super::gaussian::{GaussianComponent, MAX_WINDOW_PX};
+use super::table::{ComponentExtent, PsfTable};
 use crate::base::size::Size;
 use crate::detect::detection::MeasuredPsf;
 
@@ -19,9 +19,9 @@ pub(crate) const FIELD_TERMS: usize = 9;
 
 /// A part of the spots of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FieldLobe {
+pub(crate) struct FieldComponent {
     /// Where its share is that of the centre of the frame.
-    pub lobe: Lobe,
+    pub lobe: GaussianComponent,
     /// Its share in the corners, where the spots turn with the field.
     pub corner_share: f64,
 }
@@ -30,7 +30,7 @@ pub(crate) struct FieldLobe {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct LocalPsf {
     /// Empty where it is tabulated, and for a single Gaussian of the size that is fitted.
-    pub lobes: Vec<Lobe>,
+    pub lobes: Vec<GaussianComponent>,
     /// The size, as [`Fit::spot_px`](crate::detect::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
@@ -48,7 +48,7 @@ impl LocalPsf {
 
     /// Tabulates the lobes, unless they are too sharp.
     pub fn tabulate(&mut self) {
-        let mut extent = LobeExtent::default();
+        let mut extent = ComponentExtent::default();
         extent.add(&self.lobes);
         match extent.layout() {
             Some(layout) => self.table.fill(&self.lobes, layout),
@@ -159,7 +159,7 @@ pub(crate) enum FieldForm {
 pub(crate) struct EffectivePsf {
     /// Of a spot of the typical moments; for [`FieldForm::Radial`], of a star to the right of the
     /// centre.
-    pub lobes: Vec<FieldLobe>,
+    pub lobes: Vec<FieldComponent>,
     /// How they change over the field.
     pub form: FieldForm,
     /// Moments that the lobes have as they are.
@@ -175,12 +175,12 @@ pub(crate) struct EffectivePsf {
 impl EffectivePsf {
     /// Round Gaussians of these sizes; elongations are left out.
     pub fn gaussian(moments: FieldMoments, spot_px: f64, radius_px: usize) -> Self {
-        let lobe = Lobe {
+        let lobe = GaussianComponent {
             offset_px: [0.0; 2],
             sigma_px: spot_px,
             share: 1.0,
         };
-        let lobe = FieldLobe {
+        let lobe = FieldComponent {
             lobe,
             corner_share: 1.0,
         };
@@ -257,12 +257,12 @@ impl EffectivePsf {
         let scale = libm::exp(here[0] - self.typical[0]);
         local.lobes.clear();
         local.lobes.extend(self.lobes.iter().map(|of_field| {
-            let Lobe {
+            let GaussianComponent {
                 offset_px: [x, y],
                 sigma_px,
                 share,
             } = of_field.lobe;
-            Lobe {
+            GaussianComponent {
                 offset_px: stretch.map(|[a, b]| a * x + b * y),
                 sigma_px: scale * sigma_px,
                 share: share + outward * (of_field.corner_share - share),
@@ -358,8 +358,8 @@ mod tests {
         moments.coefficients[0][1] = 0.3;
         moments.coefficients[1][1] = 0.8;
         let offsets = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-        let lobe = |offset_px: [f64; 2]| FieldLobe {
-            lobe: Lobe {
+        let lobe = |offset_px: [f64; 2]| FieldComponent {
+            lobe: GaussianComponent {
                 offset_px,
                 sigma_px: 0.5,
                 share: 0.25,

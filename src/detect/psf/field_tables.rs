@@ -4,7 +4,7 @@
 //! mixed from the four nodes around it.
 
 use super::effective::{EffectivePsf, FieldForm, LocalPsf};
-use super::table::{LobeExtent, PsfTable};
+use super::table::{ComponentExtent, PsfTable};
 use super::taps::TableLayout;
 use crate::base::size::Size;
 use multiversion::multiversion;
@@ -125,7 +125,7 @@ impl<'a> FieldTables<'a> {
     /// The layout that suits the spots at all nodes; `None` where they are too sharp for a table.
     fn common_layout(&self) -> Option<TableLayout> {
         let mut local = LocalPsf::default();
-        let mut extent = LobeExtent::default();
+        let mut extent = ComponentExtent::default();
         for row in 0..self.cells[1] + 1 {
             for column in 0..self.cells[0] + 1 {
                 self.lobes_at([column, row], &mut local);
@@ -171,7 +171,7 @@ fn mix(parts: [(&[f32], f32); 4], into: &mut [f32]) {
 mod tests {
     use super::super::table::tests::lobes;
     use super::*;
-    use crate::detect::psf::{FieldFrame, FieldLobe, FieldMoments, Lobe};
+    use crate::detect::psf::{FieldComponent, FieldFrame, FieldMoments, GaussianComponent};
 
     #[test]
     fn tables_between_nodes_agree_with_the_spot_there() {
@@ -182,7 +182,7 @@ mod tests {
         moments.coefficients[0][5] = 0.69;
         moments.coefficients[1][3] = 0.4;
         moments.range = [[0.0, 0.69], [0.0, 0.4], [0.0, 0.0]];
-        let lobe = |lobe: Lobe| FieldLobe {
+        let lobe = |lobe: GaussianComponent| FieldComponent {
             lobe,
             corner_share: lobe.share,
         };

@@ -24,7 +24,7 @@ pub(crate) const MAX_WINDOW_PX: usize = 49;
 pub(crate) const GROUP_PX: usize = 8;
 /// Part of a spot: a round Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lobe {
+pub(crate) struct GaussianComponent {
     /// Position relative to the spot's centre of light, along x and y, in pixels.
     pub offset_px: [f64; 2],
     /// Standard deviation, in pixels.

@@ -14,13 +14,13 @@ mod table;
 mod taps;
 
 pub(crate) use effective::{
-    EffectivePsf, FIELD_TERMS, FieldForm, FieldFrame, FieldLobe, FieldMoments, LocalPsf,
+    EffectivePsf, FIELD_TERMS, FieldComponent, FieldForm, FieldFrame, FieldMoments, LocalPsf,
     SpotMoments, covariance, covariance_by, inverse, polynomials, stretch_by,
 };
 pub(crate) use field_tables::FieldTables;
 pub(crate) use gaussian::{
-    AxisProfile, Cumulative, GROUP_PX, LitPart, Lobe, MAX_TAPS, MAX_WINDOW_PX, NarrowProfiles,
-    PIXEL_VARIANCE_PX2, PixelGroup, ProfilePart, centered_profile, erf_and_gauss,
+    AxisProfile, Cumulative, GROUP_PX, GaussianComponent, LitPart, MAX_TAPS, MAX_WINDOW_PX,
+    NarrowProfiles, PIXEL_VARIANCE_PX2, PixelGroup, ProfilePart, centered_profile, erf_and_gauss,
 };
 pub(crate) use lanes::{each, each_of, plus, times};
 pub(crate) use table::{DrawBuffers, LIGHT, LIGHT_BY_ALL, LIGHT_BY_PLACE, ShareGroup};

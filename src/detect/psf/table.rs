@@ -12,7 +12,9 @@
 //! pixels' integration in it; Unser, Aldroubi & Eden 1993, IEEE Trans. Signal Process. 41, 821, doi
 //! 10.1109/78.193220, for interpolation with B-splines.
 
-use super::gaussian::{CumulativeProfile, GROUP_PX, Lobe, PIXEL_VARIANCE_PX2, PixelGroup};
+use super::gaussian::{
+    CumulativeProfile, GROUP_PX, GaussianComponent, PIXEL_VARIANCE_PX2, PixelGroup,
+};
 use super::lanes::each_of;
 use super::taps::{AxisTaps, PixelTaps, TAPS, TableLayout, fill_axes};
 use crate::base::size::Size;
@@ -33,12 +35,12 @@ pub(crate) const LIGHT_BY_ALL: usize = 4;
 
 /// How sharp lobes are, and how far they reach.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LobeExtent {
+pub(super) struct ComponentExtent {
     least_px: f64,
     reach_px: f64,
 }
 
-impl Default for LobeExtent {
+impl Default for ComponentExtent {
     /// Of no lobes.
     fn default() -> Self {
         Self {
@@ -48,9 +50,9 @@ impl Default for LobeExtent {
     }
 }
 
-impl LobeExtent {
+impl ComponentExtent {
     /// Adds lobes.
-    pub fn add(&mut self, lobes: &[Lobe]) {
+    pub fn add(&mut self, lobes: &[GaussianComponent]) {
         for lobe in lobes {
             let [dx, dy] = lobe.offset_px.map(f64::abs);
             let reach_px = dx.max(dy) + REACH_SIGMAS * lobe.sigma_px + 0.5;
@@ -94,7 +96,7 @@ impl PsfTable {
     }
 
     /// Tabulates lobes.
-    pub(super) fn fill(&mut self, lobes: &[Lobe], layout: TableLayout) {
+    pub(super) fn fill(&mut self, lobes: &[GaussianComponent], layout: TableLayout) {
         self.layout = layout;
         self.coefficients.clear();
         self.coefficients.resize(layout.len(), 0.0);
@@ -469,15 +471,15 @@ pub(super) mod tests {
     const MAX_ERRORS_SCALED: [f32; 4] = [3e-2, 0.2, 0.2, 0.3];
 
     /// A lopsided spot of lobes of this size.
-    pub fn lobes(sigma_px: f64) -> Vec<Lobe> {
+    pub fn lobes(sigma_px: f64) -> Vec<GaussianComponent> {
         let offsets = [[-1.2, 0.1], [0.3, -0.6], [0.5, 0.4]];
         let shares = [0.25, 0.35, 0.4];
-        let lobe = |(offset, share): ([f64; 2], f64)| Lobe {
+        let lobe = |(offset, share): ([f64; 2], f64)| GaussianComponent {
             offset_px: offset.map(|at| 2.0 * sigma_px * at),
             sigma_px,
             share,
         };
-        let mut lobes: Vec<Lobe> = offsets.into_iter().zip(shares).map(lobe).collect();
+        let mut lobes: Vec<GaussianComponent> = offsets.into_iter().zip(shares).map(lobe).collect();
         for axis in 0..2 {
             let centre: f64 = lobes.iter().map(|l| l.share * l.offset_px[axis]).sum();
             lobes.iter_mut().for_each(|l| l.offset_px[axis] -= centre);
@@ -487,7 +489,7 @@ pub(super) mod tests {
 
     /// The light and its derivatives in a pixel of a window of this side, from the lobes.
     fn expected(
-        lobes: &[Lobe],
+        lobes: &[GaussianComponent],
         scale: f64,
         place: [f64; 2],
         side: usize,
@@ -548,12 +550,12 @@ pub(super) mod tests {
             &lobes,
             TableLayout::of(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
         );
-        let scaled = |lobe: &Lobe| Lobe {
+        let scaled = |lobe: &GaussianComponent| GaussianComponent {
             offset_px: lobe.offset_px.map(|at| scale * at),
             sigma_px: scale * lobe.sigma_px,
             ..*lobe
         };
-        let lobes: Vec<Lobe> = lobes.iter().map(scaled).collect();
+        let lobes: Vec<GaussianComponent> = lobes.iter().map(scaled).collect();
         for place in [[10.0, 10.0], [9.63, 10.21], [10.5, 9.5], [2.2, 19.8]] {
             let groups = SIDE.div_ceil(GROUP_PX);
             let mut drawn = vec![[[0.0; GROUP_PX]; 4]; groups * SIDE];

@@ -1,8 +1,8 @@
 //! The circle that the sky fills in a picture by an all-sky lens.
 
 use super::SkyArea;
-use super::levels::Cells;
-use super::regions::Cell;
+use super::levels::SquareCells;
+use super::regions::CellContent;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
@@ -24,12 +24,12 @@ const MIN_CELLS: usize = 60;
 impl SkyArea {
     /// The circle that the sky fills, if its edge is one that the frame's corners lie outside of.
     pub(crate) fn circle(&self) -> Option<Circle> {
-        let Cells {
+        let SquareCells {
             side_px,
             columns,
             rows,
         } = self.cells;
-        let is_dark = |cell: usize| self.shown[cell] == Cell::Dark;
+        let is_dark = |cell: usize| self.shown[cell] == CellContent::Dark;
         let count = self.shown.len();
         let corners = [0, columns - 1, count - columns, count - 1];
         if !corners.into_iter().all(is_dark) {
@@ -103,13 +103,13 @@ mod tests {
         let middle = |at: usize| (at as f64 + 0.5) * 10.0 - 0.5;
         let cells = (0..64 * 48).map(|cell| {
             if is_hidden(middle(cell % 64), middle(cell / 64)) {
-                Cell::Dark
+                CellContent::Dark
             } else {
-                Cell::Sky
+                CellContent::Sky
             }
         });
         SkyArea {
-            cells: Cells {
+            cells: SquareCells {
                 side_px: 10,
                 columns: 64,
                 rows: 48,

@@ -14,13 +14,13 @@ const SAMPLES: usize = 3;
 /// Square cells of a frame, row by row; what is at the right and at the bottom and fills no cell belongs to
 /// the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Cells {
+pub(super) struct SquareCells {
     pub side_px: usize,
     pub columns: usize,
     pub rows: usize,
 }
 
-impl Cells {
+impl SquareCells {
     fn of(frame: &Frame) -> Self {
         let longer_px = frame.width.max(frame.height);
         let side_px = longer_px.div_ceil(CELLS).max(MIN_CELL_PX);
@@ -41,17 +41,17 @@ impl Cells {
 }
 
 /// The brightness of a frame in cells: the medians of some of their pixels.
-pub(super) struct Levels {
-    pub cells: Cells,
+pub(super) struct CellMedians {
+    pub cells: SquareCells,
     /// Row by row, in ADU; NaN where a cell has no value.
     pub adu: Vec<f32>,
     saturation_adu: f32,
 }
 
-impl Levels {
+impl CellMedians {
     /// Measures the cells of a frame.
     pub fn of(frame: &Frame, saturation_adu: f32) -> Self {
-        let cells = Cells::of(frame);
+        let cells = SquareCells::of(frame);
         let (cell_px, columns) = (cells.side_px, cells.columns);
         let mut samples = Vec::with_capacity(SAMPLES * SAMPLES);
         let mut level = |cell: usize| {
@@ -90,7 +90,7 @@ impl Levels {
             let at = at.checked_add_signed(way * steps)?;
             (at < cells).then_some(at)
         };
-        let Cells { columns, rows, .. } = self.cells;
+        let SquareCells { columns, rows, .. } = self.cells;
         let x = along(cell % columns, way[0], columns)?;
         let y = along(cell / columns, way[1], rows)?;
         Some(y * columns + x)

@@ -8,16 +8,16 @@ mod regions;
 use crate::base::coords::PixelPoint;
 use crate::frame::Frame;
 pub use circle::Circle;
-use levels::{Cells, Levels};
-use regions::Cell;
+use levels::{CellMedians, SquareCells};
+use regions::CellContent;
 use std::sync::Arc;
 
 /// The part of a frame that shows the sky, in cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkyArea {
-    cells: Cells,
+    cells: SquareCells,
     /// What each of them shows.
-    shown: Arc<[Cell]>,
+    shown: Arc<[CellContent]>,
 }
 
 impl SkyArea {
@@ -29,10 +29,10 @@ impl SkyArea {
         stars: impl Iterator<Item = PixelPoint>,
         saturation_adu: f32,
     ) -> Option<Self> {
-        let levels = Levels::of(frame, saturation_adu);
+        let levels = CellMedians::of(frame, saturation_adu);
         let stars = levels.count(stars);
         let shown = regions::cells(&levels, &stars);
-        let is_hidden = |cell: &Cell| *cell != Cell::Sky;
+        let is_hidden = |cell: &CellContent| *cell != CellContent::Sky;
         shown.iter().any(is_hidden).then(|| Self {
             cells: levels.cells,
             shown: shown.into(),
@@ -41,17 +41,21 @@ impl SkyArea {
 
     /// Whether the sky is seen at a place.
     pub fn shows(&self, place: &PixelPoint) -> bool {
-        self.shown[self.cells.at(place)] == Cell::Sky
+        self.shown[self.cells.at(place)] == CellContent::Sky
     }
 
     /// Whether something dark is at a place: light there is not that of a star, but comes through leaves.
     pub(crate) fn is_dark(&self, place: &PixelPoint) -> bool {
-        self.shown[self.cells.at(place)] == Cell::Dark
+        self.shown[self.cells.at(place)] == CellContent::Dark
     }
 
     /// The share of the frame that shows the sky.
     pub fn share(&self) -> f64 {
-        let seen = self.shown.iter().filter(|cell| **cell == Cell::Sky).count();
+        let seen = self
+            .shown
+            .iter()
+            .filter(|cell| **cell == CellContent::Sky)
+            .count();
         seen as f64 / self.shown.len() as f64
     }
 }

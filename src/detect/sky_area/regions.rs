@@ -1,6 +1,6 @@
 //! Dark areas with a sharp edge and few stars.
 
-use super::levels::Levels;
+use super::levels::CellMedians;
 use image::{GrayImage, ImageBuffer, Luma};
 use imageproc::distance_transform::Norm;
 use imageproc::morphology::{dilate, open};
@@ -23,7 +23,7 @@ const MIN_EXPECTED_STARS: f64 = 8.0;
 
 /// What a cell of a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Cell {
+pub(super) enum CellContent {
     Sky,
     /// Something dark in front of the sky, the border around a lens's circle, or nothing.
     Dark,
@@ -39,7 +39,7 @@ const OUTSIDE: Luma<u8> = Luma([0]);
 
 /// A dark area.
 #[derive(Debug, Clone, Default)]
-struct Region {
+struct DarkArea {
     cells: usize,
     stars: u32,
     /// Relative changes of brightness across its edge.
@@ -47,18 +47,18 @@ struct Region {
 }
 
 /// What each cell shows.
-pub(super) fn cells(levels: &Levels, stars: &[u32]) -> Vec<Cell> {
+pub(super) fn cells(levels: &CellMedians, stars: &[u32]) -> Vec<CellContent> {
     // Saturated stars are smaller.
     let lit = image_of(levels, |cell| levels.is_saturated(cell));
     let lit = dilate(&open(&lit, Norm::LInf, 1), Norm::LInf, 1);
     let dark = dark(levels, stars);
     let cell = |((level, lit), dark): ((&f32, &Luma<u8>), &Luma<u8>)| {
         if level.is_nan() || *dark == INSIDE {
-            Cell::Dark
+            CellContent::Dark
         } else if *lit == INSIDE {
-            Cell::Lit
+            CellContent::Lit
         } else {
-            Cell::Sky
+            CellContent::Sky
         }
     };
     let sides = levels.adu.iter().zip(lit.pixels()).zip(dark.pixels());
@@ -66,7 +66,7 @@ pub(super) fn cells(levels: &Levels, stars: &[u32]) -> Vec<Cell> {
 }
 
 /// The dark areas that do not show the sky.
-fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
+fn dark(levels: &CellMedians, stars: &[u32]) -> GrayImage {
     let mut hidden = image_of(levels, |_| false);
     let seen = levels.adu.iter().copied().filter(|level| !level.is_nan());
     let mut sorted: Vec<f32> = seen.collect();
@@ -85,7 +85,7 @@ fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
         let dark = open(&dark, Norm::LInf, 1);
         let labels = connected_components(&dark, Connectivity::Four, OUTSIDE);
         let regions = measure(levels, stars, &labels, [sorted[0], highest]);
-        let is_hidden = |region: &Region| region.is_hidden(levels, all_stars);
+        let is_hidden = |region: &DarkArea| region.is_hidden(levels, all_stars);
         let are_hidden: Vec<bool> = regions.iter().map(is_hidden).collect();
         for (pixel, label) in hidden.pixels_mut().zip(labels.pixels()) {
             if are_hidden[label.0[0] as usize] {
@@ -96,7 +96,7 @@ fn dark(levels: &Levels, stars: &[u32]) -> GrayImage {
     hidden
 }
 
-fn image_of(levels: &Levels, is_inside: impl Fn(usize) -> bool) -> GrayImage {
+fn image_of(levels: &CellMedians, is_inside: impl Fn(usize) -> bool) -> GrayImage {
     let [columns, rows] = [levels.cells.columns, levels.cells.rows].map(|cells| cells as u32);
     GrayImage::from_fn(columns, rows, |x, y| {
         if is_inside((y * columns + x) as usize) {
@@ -109,14 +109,14 @@ fn image_of(levels: &Levels, is_inside: impl Fn(usize) -> bool) -> GrayImage {
 
 /// The regions by label; number 0 is what lies outside all.
 fn measure(
-    levels: &Levels,
+    levels: &CellMedians,
     stars: &[u32],
     labels: &Labels,
     [darkest_adu, highest_adu]: [f32; 2],
-) -> Vec<Region> {
+) -> Vec<DarkArea> {
     let labels: Vec<usize> = labels.pixels().map(|label| label.0[0] as usize).collect();
     let count = labels.iter().max().map_or(0, |most| most + 1);
-    let mut regions = vec![Region::default(); count];
+    let mut regions = vec![DarkArea::default(); count];
     let inside = labels.iter().enumerate().filter(|(_, label)| **label > 0);
     for (cell, &label) in inside {
         let region = &mut regions[label];
@@ -138,9 +138,9 @@ fn measure(
     regions
 }
 
-impl Region {
+impl DarkArea {
     /// Whether it does not show the sky: it has a sharp edge, and fewer stars than the rest.
-    fn is_hidden(&self, levels: &Levels, all_stars: u32) -> bool {
+    fn is_hidden(&self, levels: &CellMedians, all_stars: u32) -> bool {
         let others = all_stars - self.stars;
         let other_cells = levels.adu.len() - self.cells;
         let expected = f64::from(others) * self.cells as f64 / other_cells.max(1) as f64;

@@ -8,7 +8,7 @@ use crate::base::size::Size;
 use crate::detect::candidates::{Peak, RawPeak};
 use crate::detect::contrast::Contrast;
 use crate::detect::fit::{
-    BatchStart, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate,
+    BatchStart, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit,
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use arrayvec::ArrayVec;
@@ -237,8 +237,8 @@ fn fit_stars(
     maps: &FrameMaps<'_>,
     starts: &Starts,
     buffers: &mut FitBuffers,
-) -> ArrayVec<Option<Fit>, MAX_STARS> {
-    let mut fits: ArrayVec<Option<Fit>, MAX_STARS> = starts.iter().map(|_| None).collect();
+) -> ArrayVec<Option<SpotFit>, MAX_STARS> {
+    let mut fits: ArrayVec<Option<SpotFit>, MAX_STARS> = starts.iter().map(|_| None).collect();
     let config = FitConfig {
         spot_px: starts
             .iter()
@@ -277,7 +277,7 @@ fn fit_stars(
 
 /// Whether the fit's window, which is still in `buffers`, holds no light of another star: no pixel
 /// with next to no light of the star is above what its error and noise explain.
-fn is_alone(fit: &Fit, buffers: &mut FitBuffers) -> bool {
+fn is_alone(fit: &SpotFit, buffers: &mut FitBuffers) -> bool {
     /// Noise of a pixel, in standard deviations.
     const NOISE_SIGMA: f64 = 5.0;
     let mut pixels = buffers.fitter.compare(&buffers.window, fit);

@@ -3,7 +3,7 @@
 
 use super::spot_size::{MODE_WIDTH, weighted_size};
 use crate::base::size::Size;
-use crate::detect::fit::{Fit, GaussianLight, NoiseModel, WindowPixels};
+use crate::detect::fit::{GaussianLight, NoiseModel, SpotFit, WindowPixels};
 use crate::detect::psf::{FieldFrame, GROUP_PX};
 
 /// Smallest log axis ratio that counts as elongated.
@@ -49,7 +49,7 @@ impl CommonElongation {
         clippy::needless_range_loop,
         reason = "lanes of several arrays read best as indices"
     )]
-    pub fn add(&mut self, light: &GaussianLight<'_>, fit: &Fit, pixels: &WindowPixels<'_>) {
+    pub fn add(&mut self, light: &GaussianLight<'_>, fit: &SpotFit, pixels: &WindowPixels<'_>) {
         let [across, down] = light.axes;
         let mut sums = [[0.0f32; 2]; 2];
         let sigma = fit.spot_px as f32;
@@ -107,7 +107,7 @@ impl CommonElongation {
 pub(super) fn is_departure(
     elongation: &CommonElongation,
     noise: &NoiseModel,
-    stars: &[Fit],
+    stars: &[SpotFit],
     spot_px: f64,
 ) -> bool {
     if elongation.exceeds(MIN_ELONGATION_OF_SHARP) {
@@ -124,10 +124,10 @@ pub(super) fn is_departure(
 }
 
 /// Whether the sizes of stars differ by more than their errors.
-fn have_scattered_sizes(stars: &[Fit], spot_px: f64) -> bool {
+fn have_scattered_sizes(stars: &[SpotFit], spot_px: f64) -> bool {
     /// Sizes beyond this factor of the frame's are not of stars.
     const MAX_FACTOR: f64 = MODE_WIDTH * MODE_WIDTH;
-    let is_star = |fit: &&Fit| libm::log(fit.spot_px / spot_px).abs() < libm::log(MAX_FACTOR);
+    let is_star = |fit: &&SpotFit| libm::log(fit.spot_px / spot_px).abs() < libm::log(MAX_FACTOR);
     let stars = stars.iter().filter(is_star);
     let scatter = MIN_SIZE_SCATTER * spot_px;
     let Some(mean_px) = weighted_size(stars.clone()) else {

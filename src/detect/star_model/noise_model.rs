@@ -8,8 +8,8 @@ use super::departure::{CommonElongation, is_departure};
 use super::spot_size::{BrightStars, MAX_STARS, MODE_WIDTH, weighted_size};
 use crate::base::least_squares::solve_pair;
 use crate::detect::fit::{
-    AnyLight, BatchStart, CholeskyFactor, Fit, FitBuffers, FitConfig, FrameMaps, NoiseModel,
-    ONE_SPOT, SpotEstimate, SpotLight, Window, WindowPixels, linearise, sum_of,
+    AnyLight, BatchStart, CholeskyFactor, FitBuffers, FitConfig, FrameMaps, NoiseModel, ONE_SPOT,
+    SpotEstimate, SpotFit, SpotLight, Window, WindowPixels, linearise, sum_of,
 };
 use crate::detect::psf::GROUP_PX;
 use arrayvec::ArrayVec;
@@ -60,14 +60,14 @@ pub(crate) fn star_model(
     let mut elongation = CommonElongation::of(maps.view.size());
     // Each round weights the squared residuals by the variance from the round before.
     for round in 1..=NOISE_ROUNDS {
-        let mut sums = Moments::default();
+        let mut sums = NoiseSums::default();
         let config = FitConfig {
             spot_px: stars.iter().map(|s| s.spot_px).fold(0.0, f64::max),
             free_size: true,
             noise: model,
         };
         let mut batch = mem::take(&mut buffers.batch);
-        let of_star = |(number, star): (usize, &Fit)| BatchStart {
+        let of_star = |(number, star): (usize, &SpotFit)| BatchStart {
             number,
             spot: star.spots[0],
             spot_px: star.spot_px,
@@ -106,7 +106,7 @@ pub(crate) fn noise_of(
         model_error2: 0.0,
     };
     for _ in 0..NOISE_ROUNDS {
-        let mut sums = Moments::default();
+        let mut sums = NoiseSums::default();
         let config = FitConfig {
             spot_px,
             free_size: false,
@@ -133,20 +133,20 @@ pub(crate) fn noise_of(
 /// Davidian & Carroll 1987, J. Am. Stat. Assoc. 82, 1079, doi 10.1080/01621459.1987.10478543:
 /// pseudo-likelihood, corrected for leverage.
 #[derive(Debug, Default)]
-struct Moments {
+struct NoiseSums {
     /// Σ w m², Σ w m³, Σ w m⁴.
     matrix: [f64; 3],
     /// Σ w m d, Σ w m² d.
     right: [f64; 2],
 }
 
-impl Moments {
+impl NoiseSums {
     /// Adds the pixels of one star in which its light is significant, and all of them to
     /// `elongation`.
     fn add_star(
         &mut self,
         buffers: &mut FitBuffers,
-        fit: &Fit,
+        fit: &SpotFit,
         config: &FitConfig,
         elongation: Option<&mut CommonElongation>,
     ) {

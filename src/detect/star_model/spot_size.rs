@@ -1,7 +1,7 @@
 //! The spot size of a frame: the mode of the sizes of its bright stars.
 
 use crate::detect::contrast::HOT_PIXEL_PX;
-use crate::detect::fit::{Fit, SPOT_RANGE_PX};
+use crate::detect::fit::{SPOT_RANGE_PX, SpotFit};
 use arrayvec::ArrayVec;
 
 /// The spot size where the frame has too few stars, in pixels: that of a well-focused camera.
@@ -13,7 +13,7 @@ pub(crate) const MODE_WIDTH: f64 = 1.25;
 pub(crate) const MAX_STARS: usize = 30;
 
 /// Bright stars, each fitted with a free size.
-pub(crate) type BrightStars = ArrayVec<Fit, MAX_STARS>;
+pub(crate) type BrightStars = ArrayVec<SpotFit, MAX_STARS>;
 
 /// The mode of the sizes of bright stars.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,11 +31,12 @@ pub(crate) fn spot_size(stars: &BrightStars) -> Option<SpotSize> {
     /// Rounds of averaging around the mode.
     const ROUNDS: usize = 4;
     let is_spot = |size: f64| size > HOT_PIXEL_PX && size < SPOT_RANGE_PX.1;
-    let weighted = stars.iter().enumerate().map(|(rank, star)| Size {
+    let weighted = stars.iter().enumerate().map(|(rank, star)| WeightedSize {
         px: star.spot_px,
         weight: weight_of(rank, stars.len()),
     });
-    let mut sizes: ArrayVec<Size, MAX_STARS> = weighted.filter(|size| is_spot(size.px)).collect();
+    let mut sizes: ArrayVec<WeightedSize, MAX_STARS> =
+        weighted.filter(|size| is_spot(size.px)).collect();
     if sizes.len() < MIN_STARS {
         return None;
     }
@@ -58,7 +59,7 @@ pub(crate) fn spot_size(stars: &BrightStars) -> Option<SpotSize> {
 
 /// A size, and how much it counts.
 #[derive(Debug, Clone, Copy)]
-struct Size {
+struct WeightedSize {
     px: f64,
     weight: f64,
 }
@@ -75,7 +76,7 @@ fn weight_of(rank: usize, stars: usize) -> f64 {
 /// # Reference
 /// Kulldorff 1997, Commun. Stat. Theory Methods 26, 1481, doi 10.1080/03610929708831995: the scan
 /// statistic, here along the logarithm of the size.
-fn densest_cluster(sorted: &[Size]) -> f64 {
+fn densest_cluster(sorted: &[WeightedSize]) -> f64 {
     /// Narrower clusters are no denser: sizes have errors, as a ratio.
     const MIN_RATIO: f64 = 1.1;
     let count: f64 = sorted.iter().map(|size| size.weight).sum();
@@ -117,8 +118,8 @@ fn densest_cluster(sorted: &[Size]) -> f64 {
 /// # Reference
 /// DerSimonian & Laird 1986, Control. Clin. Trials 7, 177, doi 10.1016/0197-2456(86)90046-2, for
 /// the scatter.
-pub(crate) fn weighted_size<'a>(stars: impl Iterator<Item = &'a Fit> + Clone) -> Option<f64> {
-    let is_known = |fit: &&Fit| fit.sigma_spot_px > 0.0 && fit.sigma_spot_px.is_finite();
+pub(crate) fn weighted_size<'a>(stars: impl Iterator<Item = &'a SpotFit> + Clone) -> Option<f64> {
+    let is_known = |fit: &&SpotFit| fit.sigma_spot_px > 0.0 && fit.sigma_spot_px.is_finite();
     let sizes = || {
         let known = stars.clone().filter(is_known);
         known.map(|fit| (fit.spot_px, fit.sigma_spot_px.powi(2)))
@@ -145,8 +146,8 @@ mod tests {
     /// The mode of sizes that come brightest first.
     fn mode(sizes: &[f64]) -> f64 {
         let ranks = sizes.iter().enumerate();
-        let mut sizes: Vec<Size> = ranks
-            .map(|(rank, &px)| Size {
+        let mut sizes: Vec<WeightedSize> = ranks
+            .map(|(rank, &px)| WeightedSize {
                 px,
                 weight: weight_of(rank, sizes.len()),
             })

@@ -127,7 +127,7 @@ impl MatchedFilter {
         } = self;
         let stride = side.next_multiple_of(LANES);
         let start = square.start + first * square.side + first;
-        let source = Source {
+        let source = FilterInput {
             pixels: pixels.get(start..).unwrap_or_default(),
             row_px: square.side,
             background_adu: square.background_adu,
@@ -142,7 +142,7 @@ impl MatchedFilter {
 }
 
 /// Pixels that are filtered, from the first on.
-struct Source<'a> {
+struct FilterInput<'a> {
     pixels: &'a [f32],
     /// Pixels from a row to the next.
     row_px: usize,
@@ -152,7 +152,13 @@ struct Source<'a> {
 /// Filters along the rows to `rows`, and along the columns to `filtered`, both `stride` wide;
 /// pixels without a value count as background.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn convolve(taps: &[f32], source: &Source, stride: usize, rows: &mut [f32], filtered: &mut [f32]) {
+fn convolve(
+    taps: &[f32],
+    source: &FilterInput,
+    stride: usize,
+    rows: &mut [f32],
+    filtered: &mut [f32],
+) {
     for (y, to) in rows.chunks_exact_mut(stride).enumerate() {
         let from = source.pixels.get(y * source.row_px..).unwrap_or_default();
         for (chunk, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {

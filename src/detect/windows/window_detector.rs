@@ -6,10 +6,10 @@ use super::square::{Square, nearest};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
 use crate::detect::fit::{
-    BatchStart, Fit, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, Window,
+    BatchStart, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, SpotFit, Window,
     window_radius,
 };
-use crate::detect::psf::{Lobe, LocalPsf, PIXEL_VARIANCE_PX2};
+use crate::detect::psf::{GaussianComponent, LocalPsf, PIXEL_VARIANCE_PX2};
 use crate::detect::star_model::{BrightStars, MAX_STARS, noise_of, spot_size, weighted_size};
 use crate::frame::Frame;
 use arrayvec::ArrayVec;
@@ -348,7 +348,7 @@ impl WindowDetector {
             sizes.extend(fit);
         });
         let mode = spot_size(&sizes)?;
-        let is_near = |fit: &&Fit| libm::log(fit.spot_px / mode.spot_px).abs() < 0.25;
+        let is_near = |fit: &&SpotFit| libm::log(fit.spot_px / mode.spot_px).abs() < 0.25;
         weighted_size(sizes.iter().filter(is_near)).or(Some(mode.spot_px))
     }
 }
@@ -388,7 +388,7 @@ fn set_smear(model: &SpotModel, smear_px: [f64; 2], psf: &mut LocalPsf) {
         for point in [-1.0, 1.0] {
             let within = 0.5 + 0.5 * point / 3f64.sqrt();
             let along = 2.0 * (part as f64 + within) / lobes as f64 - 0.5;
-            psf.lobes.push(Lobe {
+            psf.lobes.push(GaussianComponent {
                 offset_px: smear_px.map(|path_px| along * path_px),
                 sigma_px: model.spot_sigma_px,
                 share: 1.0 / lobes as f64,
@@ -439,7 +439,7 @@ fn cut_out(
 }
 
 /// The star of a fit that converged; `None` if it is not a star, or not where it is expected.
-fn star_of(fit: &Fit, expected: &ExpectedStar) -> Option<FoundStar> {
+fn star_of(fit: &SpotFit, expected: &ExpectedStar) -> Option<FoundStar> {
     let spot = fit.spots.first()?;
     let position = PixelPoint::new(spot.x, spot.y);
     let is_sharp = fit.size_excess_px < -SHARP_SIGMAS * fit.size_error_px

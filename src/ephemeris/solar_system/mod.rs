@@ -84,8 +84,8 @@ pub(crate) fn moon_and_sun(date: &ObservationDate, site: Option<Site>) -> (Body,
 
 /// A time, and those as far from it as the true one may be.
 struct Time {
-    moment: Moment,
-    limits: Vec<Moment>,
+    moment: ObserverMoment,
+    limits: Vec<ObserverMoment>,
 }
 
 impl Time {
@@ -98,7 +98,7 @@ impl Time {
         // The Earth's rotation is unknown to hours where the time is.
         let site = site.filter(|_| error == TimeError::None);
         let years = date.years_since_j2000();
-        let at = |days: f64| Moment::new(years + days / DAYS_PER_JULIAN_YEAR, site);
+        let at = |days: f64| ObserverMoment::new(years + days / DAYS_PER_JULIAN_YEAR, site);
         let limits = match error.days() {
             0.0 => Vec::new(),
             days => vec![at(-days), at(days)],
@@ -139,7 +139,7 @@ impl Time {
 const MOTION_ERROR: f64 = 0.01;
 
 /// A moment, and where the observer is then.
-struct Moment {
+struct ObserverMoment {
     /// Julian years of universal time since J2000.0.
     years: f64,
     /// Days of terrestrial time since J2000.0.
@@ -151,7 +151,7 @@ struct Moment {
     site: Option<Site>,
 }
 
-impl Moment {
+impl ObserverMoment {
     fn new(years: f64, site: Option<Site>) -> Self {
         let days_tt = terrestrial_time::days_since_j2000(years);
         let [earth_au, earth_au_per_day] = rough::about_sun(BodyKind::Moon, days_tt);

@@ -3,12 +3,12 @@
 use super::error::unsupported;
 use super::layout::FitsLayout;
 use super::unit::{FitsUnit, Units};
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::{Assumption, FrameError, ImageChoice, MIN_SIDE_PX};
 use std::num::NonZeroUsize;
 
 /// The image that is read.
-pub(super) struct Choice<'a> {
+pub(super) struct ChosenFitsImage<'a> {
     pub unit: FitsUnit<'a>,
     pub layout: FitsLayout,
     /// Its plane in the unit, if a page was asked for.
@@ -19,13 +19,13 @@ pub(super) struct Choice<'a> {
     pub assumed: Option<Assumption>,
 }
 
-impl<'a> Choice<'a> {
+impl<'a> ChosenFitsImage<'a> {
     /// Image `page` of a file, counted from 1; without `page`, the largest that can be read alone,
     /// and of several of that size the first.
     pub fn of(
         bytes: &'a [u8],
         page: Option<NonZeroUsize>,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Self, FrameError> {
         match page {
             Some(page) => Self::page(bytes, page, account),
@@ -33,7 +33,7 @@ impl<'a> Choice<'a> {
         }
     }
 
-    fn page(bytes: &'a [u8], page: NonZeroUsize, account: &Account) -> Result<Self, FrameError> {
+    fn page(bytes: &'a [u8], page: NonZeroUsize, account: &ReadBudget) -> Result<Self, FrameError> {
         let mut pages = 0;
         let mut units = Units::new(bytes);
         while let Some(unit) = units.next()? {
@@ -58,7 +58,7 @@ impl<'a> Choice<'a> {
         })
     }
 
-    fn largest(bytes: &'a [u8], account: &Account) -> Result<Self, FrameError> {
+    fn largest(bytes: &'a [u8], account: &ReadBudget) -> Result<Self, FrameError> {
         let mut pages = 0_usize;
         let mut first: Option<FitsLayout> = None;
         let mut best: Option<(FitsUnit, FitsLayout, usize)> = None;

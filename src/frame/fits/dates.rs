@@ -35,13 +35,13 @@ const TOLERANCE_S: i64 = 3600;
 const DAY_TOLERANCE_S: i64 = 36 * 3600;
 
 /// A date, and where it is from.
-struct Found {
+struct FoundDate {
     keyword: &'static str,
     text: String,
     date: CalendarDate,
 }
 
-impl Found {
+impl FoundDate {
     fn is_assumed(&self) -> bool {
         self.date.may_be_swapped || self.date.is_century_assumed
     }
@@ -90,7 +90,7 @@ impl Keywords<'_> {
         scale
     }
 
-    fn calendar_date(&self, metadata: &mut FrameMetadata) -> Option<Found> {
+    fn calendar_date(&self, metadata: &mut FrameMetadata) -> Option<FoundDate> {
         CALENDAR.iter().find_map(|keyword| {
             let text = self.text(keyword)?;
             match calendar::date(&text) {
@@ -98,7 +98,7 @@ impl Keywords<'_> {
                     if !date.date.has_time() {
                         self.add_time(&mut date, metadata);
                     }
-                    Some(Found {
+                    Some(FoundDate {
                         keyword,
                         text,
                         date,
@@ -141,7 +141,7 @@ impl Keywords<'_> {
         }
     }
 
-    fn julian_date(&self, metadata: &mut FrameMetadata) -> Option<Found> {
+    fn julian_date(&self, metadata: &mut FrameMetadata) -> Option<FoundDate> {
         /// Julian Date of the beginning of Modified Julian Dates.
         const MJD_ZERO_JD: f64 = 2_400_000.5;
         let modified = MODIFIED.map(|keyword| (keyword, 0.0, "a Modified Julian Date"));
@@ -162,7 +162,7 @@ impl Keywords<'_> {
                     let expected = format!("{name} from {} to {}", years.start(), years.end());
                     metadata.ignore(keyword, &text, &expected);
                 }
-                Some(Found {
+                Some(FoundDate {
                     keyword,
                     text,
                     date: CalendarDate {
@@ -178,10 +178,10 @@ impl Keywords<'_> {
 
 /// The date of two that is used. If they contradict each other, the other is recorded as ignored.
 fn chosen(
-    calendar: Option<Found>,
-    number: Option<Found>,
+    calendar: Option<FoundDate>,
+    number: Option<FoundDate>,
     metadata: &mut FrameMetadata,
-) -> Option<Found> {
+) -> Option<FoundDate> {
     let (calendar, number) = match (calendar, number) {
         (Some(calendar), Some(number)) => (calendar, number),
         (calendar, None) => {
@@ -212,7 +212,7 @@ fn chosen(
 }
 
 /// Whether two dates may be of the same exposure.
-fn is_same(one: &Found, other: &Found, exposure_s: Option<f64>) -> bool {
+fn is_same(one: &FoundDate, other: &FoundDate, exposure_s: Option<f64>) -> bool {
     let exposure = SignedDuration::try_from_secs_f64(exposure_s.unwrap_or(0.0));
     let has_times = one.date().has_time() && other.date().has_time();
     let of_span = [one, other]

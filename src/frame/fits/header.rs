@@ -22,14 +22,14 @@ struct Card<'a> {
 }
 
 /// The keywords of one header.
-pub(super) struct Header<'a> {
+pub(super) struct UnitHeader<'a> {
     /// The first card of each keyword.
     cards: HashMap<&'a [u8], Card<'a>>,
     /// Offset in the file.
     offset: usize,
 }
 
-impl<'a> Header<'a> {
+impl<'a> UnitHeader<'a> {
     /// Parses the header at `offset`. Also returns the offset of the data.
     pub fn parse(bytes: &'a [u8], offset: usize) -> Result<(Self, usize), FrameError> {
         let mut cards = HashMap::new();
@@ -189,7 +189,7 @@ mod tests {
             "COMMENT = not a value at all",
             "NAXIS   = 3",
         ]);
-        let (header, data) = Header::parse(&bytes, 0).unwrap();
+        let (header, data) = UnitHeader::parse(&bytes, 0).unwrap();
         assert_eq!(data, BLOCK_BYTES);
         assert!(header.is_true("SIMPLE"));
         assert_eq!(
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn an_invalid_value_is_reported_with_its_offset() {
         let bytes = header(&["SIMPLE  = T", "NAXIS   = two", "BSCALE  = NaN"]);
-        let (header, _) = Header::parse(&bytes, 0).unwrap();
+        let (header, _) = UnitHeader::parse(&bytes, 0).unwrap();
         let error = header.required("NAXIS", "a number").unwrap_err();
         assert!(
             error
@@ -225,11 +225,11 @@ mod tests {
     fn a_header_without_an_end_is_truncated() {
         let bytes = header(&["SIMPLE  = T"]);
         for length in [0, 79, 80, 159] {
-            let Err(error) = Header::parse(&bytes[..length], 0) else {
+            let Err(error) = UnitHeader::parse(&bytes[..length], 0) else {
                 panic!("{length} bytes are no header");
             };
             assert!(matches!(error, FrameError::Truncated { .. }), "{error}");
         }
-        assert!(Header::parse(&bytes, usize::MAX).is_err());
+        assert!(UnitHeader::parse(&bytes, usize::MAX).is_err());
     }
 }

@@ -5,12 +5,12 @@ use super::layout::FitsLayout;
 use super::tiles;
 use super::unit::{FitsUnit, StoredType};
 use crate::base::size::Size;
-use crate::frame::account::{Account, FLOATS_BYTES_PER_PIXEL};
+use crate::frame::account::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use crate::frame::levels::{LevelSamples, WholeNumber, frame_from_floats, frame_from_integers};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.
-pub(super) struct Image<'a> {
+pub(super) struct FitsImage<'a> {
     layout: FitsLayout,
     /// Its plane in the header-data unit, from 0.
     plane: usize,
@@ -19,17 +19,17 @@ pub(super) struct Image<'a> {
     zero: f64,
     /// The stored integer that marks a pixel without a value.
     blank: Option<i64>,
-    account: &'a Account,
+    account: &'a ReadBudget,
 }
 
-impl<'a> Image<'a> {
+impl<'a> FitsImage<'a> {
     /// The image `plane` of `unit`, which has this layout. A cube has several planes, and one must be
     /// chosen.
     pub fn new(
         unit: &FitsUnit,
         layout: FitsLayout,
         plane: Option<usize>,
-        account: &'a Account,
+        account: &'a ReadBudget,
     ) -> Result<Self, FrameError> {
         if plane.is_none() && layout.is_cube() {
             let axes: Vec<String> = unit.axes.iter().map(usize::to_string).collect();

@@ -21,7 +21,7 @@
 //!
 //! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
 
-use super::header::{Header, parse_number};
+use super::header::{UnitHeader, parse_number};
 use crate::base::angle::Angle;
 use crate::ephemeris::observer::Site;
 use crate::frame::metadata::{
@@ -84,11 +84,11 @@ impl StatedSaturation {
 }
 
 /// The keywords of several headers.
-pub(super) struct Keywords<'a>(Vec<&'a Header<'a>>);
+pub(super) struct Keywords<'a>(Vec<&'a UnitHeader<'a>>);
 
 impl<'a> Keywords<'a> {
     /// Those of `headers`; earlier headers have priority.
-    pub(super) fn new(headers: impl Iterator<Item = &'a Header<'a>>) -> Self {
+    pub(super) fn new(headers: impl Iterator<Item = &'a UnitHeader<'a>>) -> Self {
         Self(headers.collect())
     }
 

@@ -36,12 +36,12 @@ pub(crate) use header::BLOCK_BYTES;
 pub(crate) use write::write_rows;
 pub use write::{FitsSamples, FitsWriteError, write_fits};
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::image::Frame;
-use choice::Choice;
-use header::Header;
-use image::Image;
+use choice::ChosenFitsImage;
+use header::UnitHeader;
+use image::FitsImage;
 use keywords::Keywords;
 use std::num::NonZeroUsize;
 use unit::Units;
@@ -53,18 +53,18 @@ use unit::Units;
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
-    let Choice {
+    let ChosenFitsImage {
         unit,
         layout,
         plane,
         image: choice,
         assumed,
-    } = Choice::of(bytes, page, account)?;
-    let image = Image::new(&unit, layout, plane, account)?;
+    } = ChosenFitsImage::of(bytes, page, account)?;
+    let image = FitsImage::new(&unit, layout, plane, account)?;
     // The primary header holds the keywords that are common to all units.
-    let (primary, _) = Header::parse(bytes, 0)?;
+    let (primary, _) = UnitHeader::parse(bytes, 0)?;
     let keywords = Keywords::new([&unit.header, &primary].into_iter());
     let mut metadata = keywords::metadata(&keywords);
     metadata.ignored.extend(unit.ignored_blanks());
@@ -79,7 +79,7 @@ pub(super) fn decode(
 }
 
 /// The number of images in a FITS file, and why there may be more that cannot be found.
-pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<FrameError>) {
+pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<FrameError>) {
     let (mut pages, mut units) = (0_usize, Units::new(bytes));
     loop {
         let unit = account.check_time().and_then(|()| units.next());

@@ -3,7 +3,7 @@
 
 use super::keywords::Keywords;
 use crate::base::statistics::median_of_rounded;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::image::Frame;
 use crate::frame::metadata::FrameMetadata;
@@ -26,7 +26,7 @@ pub(super) fn take(
     frame: &mut Frame<'static>,
     keywords: &Keywords,
     metadata: &mut FrameMetadata,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<(), FrameError> {
     let Some(text) = keywords.text(KEYWORD) else {
         return Ok(());

@@ -1,11 +1,11 @@
 use super::header::BLOCK_BYTES;
 use super::*;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::{BayerPattern, RowOrder};
 use proptest::prelude::*;
 
 fn decode(bytes: &[u8], page: Option<NonZeroUsize>) -> Result<Frame<'static>, FrameError> {
-    super::decode(bytes, page, &Account::default())
+    super::decode(bytes, page, &ReadBudget::default())
 }
 
 /// A header-data unit of these cards and data, padded to blocks.

@@ -1,7 +1,7 @@
 //! The header-data units of a file.
 
 use super::error::truncated;
-use super::header::{BLOCK_BYTES, Header};
+use super::header::{BLOCK_BYTES, UnitHeader};
 use super::layout::FitsLayout;
 use crate::frame::{FrameError, IgnoredValue};
 use std::ops::RangeInclusive;
@@ -37,7 +37,7 @@ impl<'a> Units<'a> {
         if at > 0 && !rest.starts_with(b"XTENSION") {
             return Ok(None);
         }
-        let (header, data) = Header::parse(self.bytes, at)?;
+        let (header, data) = UnitHeader::parse(self.bytes, at)?;
         let unit = FitsUnit::new(header, data)?;
         self.end = unit.end();
         // Headers and data are padded to whole blocks.
@@ -59,7 +59,7 @@ pub(super) enum StoredType {
 }
 
 impl StoredType {
-    fn of(header: &Header, keyword: &str) -> Result<Self, FrameError> {
+    fn of(header: &UnitHeader, keyword: &str) -> Result<Self, FrameError> {
         const EXPECTED: &str = "8, 16, 32, 64, -32 or -64";
         Ok(match header.required(keyword, EXPECTED)? {
             8 => Self::U8,
@@ -99,7 +99,7 @@ impl StoredType {
 
 /// One header-data unit.
 pub(super) struct FitsUnit<'a> {
-    pub header: Header<'a>,
+    pub header: UnitHeader<'a>,
     /// Offset of the data in the file.
     pub data: usize,
     /// Type of the values of the image, compressed or not.
@@ -113,7 +113,7 @@ pub(super) struct FitsUnit<'a> {
 }
 
 impl<'a> FitsUnit<'a> {
-    fn new(header: Header<'a>, data: usize) -> Result<Self, FrameError> {
+    fn new(header: UnitHeader<'a>, data: usize) -> Result<Self, FrameError> {
         let stored = StoredType::of(&header, "BITPIX")?;
         let axes = axes(&header, "NAXIS")?;
         let data_bytes = data_bytes(&header, &axes, stored);
@@ -197,7 +197,7 @@ impl<'a> FitsUnit<'a> {
 }
 
 /// The lengths of the axes, whose number `keyword` says: NAXIS and NAXIS1, NAXIS2, …
-fn axes(header: &Header, keyword: &str) -> Result<Vec<usize>, FrameError> {
+fn axes(header: &UnitHeader, keyword: &str) -> Result<Vec<usize>, FrameError> {
     /// The standard allows 999. NumPy, which most files are written with, has no arrays of more.
     const MAX_AXES: i64 = 32;
     let expected = "a number of axes from 0 to 32";
@@ -215,7 +215,7 @@ fn axes(header: &Header, keyword: &str) -> Result<Vec<usize>, FrameError> {
 }
 
 /// Size of the data without padding, in bytes; `None` on overflow.
-fn data_bytes(header: &Header, axes: &[usize], stored: StoredType) -> Option<usize> {
+fn data_bytes(header: &UnitHeader, axes: &[usize], stored: StoredType) -> Option<usize> {
     let count = |keyword: &str, default: usize| {
         let found = header.optional(keyword, "a count").ok().flatten();
         found

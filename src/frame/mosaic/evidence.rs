@@ -65,12 +65,12 @@ fn may_be_mosaic(frame: &Frame) -> bool {
 /// How the interleaved backgrounds of a frame differ.
 struct Contrasts {
     /// Of the levels of the two diagonals, in standard deviations of a pixel.
-    levels: Mean,
+    levels: PatchMedian,
     /// Of their variances, in parts of the variance.
-    noise: Mean,
+    noise: PatchMedian,
     /// Of the levels on each diagonal.
-    falling: Mean,
-    rising: Mean,
+    falling: PatchMedian,
+    rising: PatchMedian,
 }
 
 impl Contrasts {
@@ -81,7 +81,7 @@ impl Contrasts {
             return None;
         }
         let of = |value: fn(&Patch) -> f64, patch_error| {
-            Mean::of(patches.iter().map(value).collect(), patch_error)
+            PatchMedian::of(patches.iter().map(value).collect(), patch_error)
         };
         Some(Self {
             levels: of(Patch::levels, Patch::LEVEL_ERROR),
@@ -125,18 +125,18 @@ impl Contrasts {
         self.alike()
     }
 
-    fn is_small(&self, difference: &Mean) -> bool {
+    fn is_small(&self, difference: &PatchMedian) -> bool {
         difference.value.abs() < ALIKE * self.levels.value.abs()
     }
 }
 
 /// The median over the patches, and its standard error.
-struct Mean {
+struct PatchMedian {
     value: f64,
     sigma: f64,
 }
 
-impl Mean {
+impl PatchMedian {
     /// `patch_error`: the least standard error of one of `values`.
     fn of(mut values: Vec<f64>, patch_error: f64) -> Self {
         /// Standard error of a median over that of a mean, for Gaussian errors.

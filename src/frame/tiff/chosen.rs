@@ -1,8 +1,8 @@
 //! Which image of a TIFF file is the frame?
 
-use super::directory::{Directory, TiffFile, malformed};
+use super::directory::{TiffDirectory, TiffFile, malformed};
 use super::layout::{stated_size, tag};
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::limits::MAX_PAGES;
 use crate::frame::metadata::ImageChoice;
@@ -11,17 +11,17 @@ use std::num::NonZeroUsize;
 
 /// The image that is read.
 pub(super) struct Chosen<'a> {
-    pub directory: Directory<'a>,
+    pub directory: TiffDirectory<'a>,
     /// The page that the image is, or belongs to.
-    page: Directory<'a>,
+    page: TiffDirectory<'a>,
     /// What was chosen, where it is not the first image.
     pub choice: Option<ImageChoice>,
 }
 
 /// An image of the file.
-struct Candidate<'a> {
-    directory: Directory<'a>,
-    page: Directory<'a>,
+struct ImageCandidate<'a> {
+    directory: TiffDirectory<'a>,
+    page: TiffDirectory<'a>,
     /// Number of the page, from 1.
     number: usize,
     size_px: [usize; 2],
@@ -51,7 +51,7 @@ impl<'a> Chosen<'a> {
     /// first.
     /// # Errors
     /// As [`TiffFile::directories`], if there is no image before the error; [`FrameError::Interrupted`].
-    pub fn largest(file: TiffFile<'a>, account: &Account) -> Result<Self, FrameError> {
+    pub fn largest(file: TiffFile<'a>, account: &ReadBudget) -> Result<Self, FrameError> {
         let mut candidates = Vec::new();
         for (number, page) in (1..).zip(file.directories()) {
             account.check_time()?;
@@ -63,7 +63,7 @@ impl<'a> Chosen<'a> {
             };
             let images = std::iter::once(page).chain(sub_directories(&page));
             let candidates_of_page = images.filter_map(|directory| {
-                Some(Candidate {
+                Some(ImageCandidate {
                     directory,
                     page,
                     number,
@@ -75,7 +75,7 @@ impl<'a> Chosen<'a> {
                 break;
             }
         }
-        let area = |candidate: &Candidate| {
+        let area = |candidate: &ImageCandidate| {
             let [width, height] = candidate.size_px;
             width.saturating_mul(height)
         };
@@ -110,7 +110,7 @@ impl<'a> Chosen<'a> {
 
     /// How the image is drawn: as it says, else as its page says.
     pub fn orientation(&self) -> Orientation {
-        let of = |directory: &Directory| -> Option<Orientation> {
+        let of = |directory: &TiffDirectory| -> Option<Orientation> {
             let value = directory.first(tag::ORIENTATION, 0).ok()?;
             Orientation::of_tag(u32::try_from(value).ok()?)
         };
@@ -121,7 +121,7 @@ impl<'a> Chosen<'a> {
 }
 
 /// The images attached to a page that can be found.
-fn sub_directories<'a>(page: &Directory<'a>) -> impl Iterator<Item = Directory<'a>> {
+fn sub_directories<'a>(page: &TiffDirectory<'a>) -> impl Iterator<Item = TiffDirectory<'a>> {
     let file = page.file;
     let places = page.numbers(tag::SUB_IFDS).unwrap_or_default();
     let places = places.iter().take(MAX_PAGES);
@@ -130,7 +130,7 @@ fn sub_directories<'a>(page: &Directory<'a>) -> impl Iterator<Item = Directory<'
 
 /// The size of the picture that a directory describes; `None` for masks, maps of depth, and
 /// directories without a size.
-fn picture_size(directory: &Directory) -> Option<[usize; 2]> {
+fn picture_size(directory: &TiffDirectory) -> Option<[usize; 2]> {
     const MASK_OR_DEPTH: u64 = 4 | 8;
     let kind = directory.first(tag::NEW_SUBFILE_TYPE, 0).ok()?;
     let size = stated_size(directory).ok()?;
@@ -138,7 +138,7 @@ fn picture_size(directory: &Directory) -> Option<[usize; 2]> {
 }
 
 /// Whether an image attached to a page is a picture and no raw data of a detector.
-pub(in crate::frame) fn has_picture_in_sub_directories(page: &Directory) -> bool {
+pub(in crate::frame) fn has_picture_in_sub_directories(page: &TiffDirectory) -> bool {
     const PICTURES: [u64; 4] = [0, 1, 2, 6];
     sub_directories(page).any(|directory| {
         let photometric = directory.first(tag::PHOTOMETRIC, u64::MAX);

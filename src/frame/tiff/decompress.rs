@@ -3,7 +3,7 @@
 use super::directory::{TiffFile, malformed, truncated};
 use super::layout::{Chunk, Color, Compression, Layout};
 use crate::base::size::Size;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::jpeg::Jpeg;
 use std::borrow::Cow;
@@ -13,7 +13,7 @@ use std::io::Read;
 #[derive(Clone, Copy)]
 pub(super) struct ChunkSource<'a> {
     pub file: TiffFile<'a>,
-    pub account: &'a Account,
+    pub account: &'a ReadBudget,
 }
 
 /// Rows of a chunk.
@@ -86,7 +86,7 @@ impl Layout<'_> {
         &self,
         stored: &[u8],
         chunk: &Chunk,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<StripRows<'static>, FrameError> {
         let fail = |detail: String| {
             account.why(malformed(format!("JPEG at byte {}: {detail}", chunk.place)))
@@ -147,7 +147,7 @@ impl Layout<'_> {
 const BYTES_BETWEEN_CHECKS: usize = 1 << 16;
 
 /// At most `wanted` bytes of LZW.
-fn lzw(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, FrameError> {
+fn lzw(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     use weezl::decode::Configuration;
     use weezl::{BitOrder, LzwStatus};
     let configuration = Configuration::with_tiff_size_switch(BitOrder::Msb, 8);
@@ -171,7 +171,7 @@ fn lzw(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, Frame
 }
 
 /// At most `wanted` bytes of a zlib stream.
-fn deflate(stored: &[u8], wanted: usize, account: &Account) -> Result<Vec<u8>, FrameError> {
+fn deflate(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     let mut bytes = Vec::with_capacity(wanted);
     let decoder = flate2::read::ZlibDecoder::new(account.timed(stored));
     match decoder.take(wanted as u64).read_to_end(&mut bytes) {
@@ -213,7 +213,7 @@ fn pack_bits(mut stored: &[u8], wanted: usize) -> Vec<u8> {
 }
 
 /// Rows of one bit per pixel in CCITT group 4; black is 1, as libtiff has it.
-fn group_4(stored: &[u8], size: Size, account: &Account) -> Result<Vec<u8>, FrameError> {
+fn group_4(stored: &[u8], size: Size, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     use fax::Color::Black;
     use fax::decoder::{DecodeStatus, Group4Decoder, pels};
     let fail = |detail: String| malformed(format!("CCITT group 4: {detail}"));

@@ -21,7 +21,7 @@ pub(in crate::frame) struct TiffFile<'a> {
 
 /// A directory: one image and what is known of it.
 #[derive(Clone, Copy)]
-pub(in crate::frame) struct Directory<'a> {
+pub(in crate::frame) struct TiffDirectory<'a> {
     pub file: TiffFile<'a>,
     /// Its first byte in the file.
     pub place: u64,
@@ -31,21 +31,21 @@ pub(in crate::frame) struct Directory<'a> {
 }
 
 /// The value of a tag.
-struct Entry<'a> {
+struct TagValue<'a> {
     kind: u16,
     data: &'a [u8],
 }
 
 /// The unsigned numbers of a tag, as they are stored.
 #[derive(Clone, Copy, Default)]
-pub(in crate::frame) struct Numbers<'a> {
+pub(in crate::frame) struct TagNumbers<'a> {
     data: &'a [u8],
     /// Bytes of each; 0 if there are none.
     size: usize,
     is_little_endian: bool,
 }
 
-impl<'a> Numbers<'a> {
+impl<'a> TagNumbers<'a> {
     pub fn len(self) -> usize {
         self.data.len().checked_div(self.size).unwrap_or(0)
     }
@@ -82,7 +82,7 @@ impl<'a> TiffFile<'a> {
 
     /// All directories in the order of the file. The last item is an error if a directory cannot be
     /// read, which hides what comes after it.
-    pub fn directories(self) -> impl Iterator<Item = Result<Directory<'a>, FrameError>> {
+    pub fn directories(self) -> impl Iterator<Item = Result<TiffDirectory<'a>, FrameError>> {
         let first = if self.is_big {
             self.number(8, 8)
         } else {
@@ -111,7 +111,7 @@ impl<'a> TiffFile<'a> {
     /// The directory at byte `place`.
     /// # Errors
     /// [`FrameError::Truncated`].
-    pub fn directory(self, place: u64) -> Result<Directory<'a>, FrameError> {
+    pub fn directory(self, place: u64) -> Result<TiffDirectory<'a>, FrameError> {
         let (count_bytes, entry_bytes, next_bytes) =
             if self.is_big { (8, 20, 8) } else { (2, 12, 4) };
         let count = self.number(place, count_bytes)?;
@@ -123,7 +123,7 @@ impl<'a> TiffFile<'a> {
         let length = count.saturating_mul(entry_bytes);
         let entries = self.range(start, length)?;
         let next = self.number(start + length, next_bytes);
-        Ok(Directory {
+        Ok(TiffDirectory {
             file: self,
             place,
             entries,
@@ -159,7 +159,7 @@ pub(super) fn number(bytes: &[u8], is_little_endian: bool) -> u64 {
     }
 }
 
-impl<'a> Directory<'a> {
+impl<'a> TiffDirectory<'a> {
     /// Whether the directory has the tag.
     pub fn has(&self, tag: u16) -> bool {
         self.found(tag).is_some()
@@ -175,9 +175,9 @@ impl<'a> Directory<'a> {
     /// The unsigned numbers of a tag; none if it is absent.
     /// # Errors
     /// [`FrameError::Malformed`] if they are no unsigned numbers, [`FrameError::Truncated`].
-    pub fn numbers(&self, tag: u16) -> Result<Numbers<'a>, FrameError> {
-        let Some(Entry { kind, data }) = self.entry(tag)? else {
-            return Ok(Numbers::default());
+    pub fn numbers(&self, tag: u16) -> Result<TagNumbers<'a>, FrameError> {
+        let Some(TagValue { kind, data }) = self.entry(tag)? else {
+            return Ok(TagNumbers::default());
         };
         let size = match kind {
             BYTE | SHORT | LONG | IFD | LONG8 | IFD8 => size_of_kind(kind),
@@ -186,7 +186,7 @@ impl<'a> Directory<'a> {
                 return Err(malformed(detail));
             }
         };
-        Ok(Numbers {
+        Ok(TagNumbers {
             data,
             size,
             is_little_endian: self.file.is_little_endian,
@@ -208,7 +208,7 @@ impl<'a> Directory<'a> {
         self.entries.chunks_exact(entry_bytes).find(is_it)
     }
 
-    fn entry(&self, tag: u16) -> Result<Option<Entry<'a>>, FrameError> {
+    fn entry(&self, tag: u16) -> Result<Option<TagValue<'a>>, FrameError> {
         let Some(entry) = self.found(tag) else {
             return Ok(None);
         };
@@ -221,7 +221,7 @@ impl<'a> Directory<'a> {
             Some(data) => data,
             None => self.file.range(number(value, is_little_endian), length)?,
         };
-        Ok(Some(Entry { kind, data }))
+        Ok(Some(TagValue { kind, data }))
     }
 }
 

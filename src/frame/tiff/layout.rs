@@ -1,6 +1,6 @@
 //! How does a TIFF file store an image? Known before anything is decoded.
 
-use super::directory::{Directory, Numbers, malformed};
+use super::directory::{TagNumbers, TiffDirectory, malformed};
 use crate::base::size::Size;
 use crate::frame::account::FLOATS_BYTES_PER_PIXEL;
 use crate::frame::error::FrameError;
@@ -44,7 +44,7 @@ const PREDICTORS: &str =
 pub(super) struct Layout<'a> {
     pub width: usize,
     pub height: usize,
-    pub depth: Depth,
+    pub depth: SampleType,
     /// Channels that are read: 1 grey, 3 colors.
     pub channels: usize,
     /// Samples of a pixel in one chunk: all of them, or one where each channel has a plane.
@@ -57,15 +57,15 @@ pub(super) struct Layout<'a> {
     /// Columns and rows of a strip or a tile.
     pub chunk_size: Size,
     /// Place and length of each chunk; a length may be absent.
-    places: Numbers<'a>,
-    lengths: Numbers<'a>,
+    places: TagNumbers<'a>,
+    lengths: TagNumbers<'a>,
     /// Tables that all chunks in JPEG share.
     pub jpeg_tables: Option<&'a [u8]>,
 }
 
 /// The numbers that are stored.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Depth {
+pub(super) struct SampleType {
     pub bits: u32,
     pub format: SampleFormat,
 }
@@ -122,11 +122,11 @@ impl<'a> Layout<'a> {
     /// # Errors
     /// [`FrameError::Unsupported`], [`FrameError::Malformed`], [`FrameError::TooLarge`],
     /// [`FrameError::TooSmall`], [`FrameError::Truncated`].
-    pub fn of(directory: &Directory<'a>) -> Result<Self, FrameError> {
+    pub fn of(directory: &TiffDirectory<'a>) -> Result<Self, FrameError> {
         let Size { width, height } = stated_size(directory)?;
         check_size(width, height)?;
         let samples = directory.first(tag::SAMPLES_PER_PIXEL, 1)? as usize;
-        let depth = Depth::of(directory)?;
+        let depth = SampleType::of(directory)?;
         let color = Color::of(directory)?;
         let channels = color.channels(samples)?;
         let compression = Compression::of(directory, depth, color)?;
@@ -162,15 +162,15 @@ impl<'a> Layout<'a> {
             is_bit_reversed: compression != Compression::Jpeg
                 && directory.first(tag::FILL_ORDER, 1)? == 2,
             chunk_size: Size::new(width, height),
-            places: Numbers::default(),
-            lengths: Numbers::default(),
+            places: TagNumbers::default(),
+            lengths: TagNumbers::default(),
             jpeg_tables: directory.bytes_of(tag::JPEG_TABLES)?,
         };
         layout.read_chunk_table(directory)?;
         Ok(layout)
     }
 
-    fn read_chunk_table(&mut self, directory: &Directory<'a>) -> Result<(), FrameError> {
+    fn read_chunk_table(&mut self, directory: &TiffDirectory<'a>) -> Result<(), FrameError> {
         let side = |tag: u16, default: usize, name: &str| -> Result<usize, FrameError> {
             match directory.first(tag, default as u64)? {
                 0 => Err(malformed(format!("{name} is 0 (tag {tag})"))),
@@ -245,7 +245,7 @@ impl<'a> Layout<'a> {
     /// Where 16-bit grey levels lie in the file, if they are contiguous, uncompressed, and 0 is
     /// black.
     pub fn plain_words(&self) -> Option<(u64, u64)> {
-        const WORDS: Depth = Depth {
+        const WORDS: SampleType = SampleType {
             bits: 16,
             format: SampleFormat::Unsigned,
         };
@@ -293,7 +293,7 @@ impl<'a> Layout<'a> {
 }
 
 /// The size that a directory states.
-pub(super) fn stated_size(directory: &Directory) -> Result<Size, FrameError> {
+pub(super) fn stated_size(directory: &TiffDirectory) -> Result<Size, FrameError> {
     let side = |tag: u16, name: &str| -> Result<usize, FrameError> {
         if !directory.has(tag) {
             return Err(malformed(format!("no {name} (tag {tag})")));
@@ -306,13 +306,13 @@ pub(super) fn stated_size(directory: &Directory) -> Result<Size, FrameError> {
     ))
 }
 
-impl Depth {
+impl SampleType {
     /// The largest level of whole numbers.
     pub fn full_scale(self) -> u64 {
         u64::MAX >> (u64::BITS - self.bits)
     }
 
-    fn of(directory: &Directory) -> Result<Self, FrameError> {
+    fn of(directory: &TiffDirectory) -> Result<Self, FrameError> {
         /// Depths of channels that a message lists.
         const MAX_LISTED: usize = 5;
         let all_bits = directory.numbers(tag::BITS_PER_SAMPLE)?;
@@ -354,7 +354,7 @@ impl Depth {
 }
 
 impl Color {
-    fn of(directory: &Directory) -> Result<Self, FrameError> {
+    fn of(directory: &TiffDirectory) -> Result<Self, FrameError> {
         if !directory.has(tag::PHOTOMETRIC) {
             let detail = format!("no PhotometricInterpretation (tag {})", tag::PHOTOMETRIC);
             return Err(malformed(detail));
@@ -392,7 +392,7 @@ impl Color {
 }
 
 impl Compression {
-    fn of(directory: &Directory, depth: Depth, color: Color) -> Result<Self, FrameError> {
+    fn of(directory: &TiffDirectory, depth: SampleType, color: Color) -> Result<Self, FrameError> {
         let code = directory.first(tag::COMPRESSION, 1)?;
         let found = match code {
             1 => Self::None,
@@ -425,8 +425,8 @@ impl Compression {
 
 impl Predictor {
     fn of(
-        directory: &Directory,
-        depth: Depth,
+        directory: &TiffDirectory,
+        depth: SampleType,
         compression: Compression,
     ) -> Result<Self, FrameError> {
         // The tag belongs to these compressions.

@@ -14,7 +14,7 @@ mod layout;
 mod samples;
 mod write;
 
-use super::account::Account;
+use super::account::ReadBudget;
 use super::error::FrameError;
 use super::exif;
 use super::image::Frame;
@@ -39,7 +39,7 @@ pub use write::{TiffOptions, TiffSamples, write_tiff};
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &Account,
+    account: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     let file = TiffFile::of(bytes)?;
@@ -68,7 +68,7 @@ pub(super) fn decode(
 
 /// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
 /// be found.
-pub(super) fn count_pages(bytes: &[u8], account: &Account) -> (usize, Option<FrameError>) {
+pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<FrameError>) {
     let file = match TiffFile::of(bytes) {
         Ok(file) => file,
         Err(error) => return (0, Some(error)),
@@ -142,7 +142,7 @@ impl Layout<'_> {
         &self,
         values: &[T],
         full_scale: T,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.width,
@@ -156,7 +156,7 @@ impl Layout<'_> {
     fn floats(
         &self,
         mut values: Vec<f32>,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         if self.color == Color::WhiteIsZero {
             values.iter_mut().for_each(|value| *value = 1.0 - *value);

@@ -1,6 +1,6 @@
 //! TIFF files made by hand, of every layout.
 
-use super::directory::{Directory, TiffFile};
+use super::directory::{TiffDirectory, TiffFile};
 use super::has_picture_in_sub_directories;
 use crate::base::size::Size;
 use crate::frame::{Frame, FrameError, decode, decode_page};
@@ -507,7 +507,7 @@ fn samples_of_a_pixel_need_no_memory_before_their_bytes_are_there() {
 fn numbers_of_a_directory_are_of_the_types_that_hold_them() {
     let bytes = tiff(&[Page::grey(4, 3, 1)], false);
     let file = TiffFile::of(&bytes).unwrap();
-    let directories: Result<Vec<Directory>, FrameError> = file.directories().collect();
+    let directories: Result<Vec<TiffDirectory>, FrameError> = file.directories().collect();
     let [directory] = directories.unwrap().try_into().ok().unwrap();
     let numbers = |tag: u16| -> Vec<u64> { directory.numbers(tag).unwrap().iter().collect() };
     assert_eq!(numbers(256), [4]);

@@ -72,7 +72,7 @@ pub fn find(field: &StarField, is_named: impl Fn(&ObservedStar) -> bool) -> Opti
     let [originals, copies] = [&named, &unnamed].map(|stars| pairs(stars, least_px));
     let density = density(&unnamed, field.width_px * field.height_px);
     let hypotheses = (2 * originals.len() * copies.len()) as f64;
-    let search = Search {
+    let search = RepeatSearch {
         field,
         named: &named,
         unnamed: &unnamed,
@@ -108,13 +108,13 @@ fn length(along: Complex<f64>) -> f64 {
 }
 
 /// Two stars.
-struct Pair {
+struct StarPair {
     from: Complex<f64>,
     along: Complex<f64>,
     mag: [f64; 2],
 }
 
-impl Pair {
+impl StarPair {
     /// Whether it can be a copy of the other pair.
     fn is_like(&self, other: &Self) -> bool {
         let step_mag = |pair: &Self| pair.mag[1] - pair.mag[0];
@@ -124,15 +124,15 @@ impl Pair {
 }
 
 /// Each star with the nearest ones that are not too near.
-fn pairs(stars: &[&ObservedStar], least_px: f64) -> Vec<Pair> {
+fn pairs(stars: &[&ObservedStar], least_px: f64) -> Vec<StarPair> {
     let mut pairs = Vec::new();
     for star in stars {
-        let pair = |other: &&ObservedStar| Pair {
+        let pair = |other: &&ObservedStar| StarPair {
             from: place(star),
             along: place(other) - place(star),
             mag: [star.mag, other.mag],
         };
-        let mut near: Vec<Pair> = stars.iter().map(pair).collect();
+        let mut near: Vec<StarPair> = stars.iter().map(pair).collect();
         near.retain(|pair| length(pair.along) > least_px);
         near.sort_by(|a, b| length(a.along).total_cmp(&length(b.along)));
         pairs.extend(near.into_iter().take(NEIGHBORS));
@@ -151,7 +151,7 @@ struct Map {
 }
 
 impl Map {
-    fn new(original: &Pair, copy: &Pair, is_mirrored: bool) -> Self {
+    fn new(original: &StarPair, copy: &StarPair, is_mirrored: bool) -> Self {
         let along = turned_over(original.along, is_mirrored);
         Self {
             factor: copy.along / along,
@@ -182,14 +182,14 @@ fn turned_over(along: Complex<f64>, is_mirrored: bool) -> Complex<f64> {
     if is_mirrored { along.conj() } else { along }
 }
 
-struct Search<'a> {
+struct RepeatSearch<'a> {
     field: &'a StarField,
     named: &'a [&'a ObservedStar],
     /// From left to right.
     unnamed: &'a [&'a ObservedStar],
 }
 
-impl Search<'_> {
+impl RepeatSearch<'_> {
     /// How many stars besides the pair a similarity takes to places in the frame, and what is there of
     /// them; `None` where it is too little.
     fn test(&self, map: &Map) -> Option<(usize, RepeatedSky)> {

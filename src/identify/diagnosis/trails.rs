@@ -34,13 +34,13 @@ const FIRST_REACH: u32 = 32;
 const CELL_PX: usize = 64;
 
 /// A source's region as a bar with the same second moments.
-struct Bar {
+struct SourceStreak {
     angle_rad: f64,
     length_px: f64,
     breadth_px: f64,
 }
 
-impl Bar {
+impl SourceStreak {
     fn is_trail(&self) -> bool {
         self.length_px > SHORTEST_PX && self.length_px > ELONGATION * self.breadth_px
     }
@@ -53,11 +53,11 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
     }
     let above = above_background(frame);
     let areas = areas(frame, &above, detections);
-    let bars: Vec<Bar> = areas
+    let bars: Vec<SourceStreak> = areas
         .iter()
         .filter_map(|area| bar(area, frame.width))
         .collect();
-    let trails: Vec<&Bar> = bars.iter().filter(|bar| bar.is_trail()).collect();
+    let trails: Vec<&SourceStreak> = bars.iter().filter(|bar| bar.is_trail()).collect();
     let count = trails.len();
     if count < MIN || (count as f64) < MAX_OF_ALL * areas.len() as f64 {
         return None;
@@ -161,7 +161,7 @@ fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<
 }
 
 /// The bar with the second moments of the region; `None` if it is too large for a star.
-fn bar(area: &[usize], width: usize) -> Option<Bar> {
+fn bar(area: &[usize], width: usize) -> Option<SourceStreak> {
     if area.len() > MAX_PX {
         return None;
     }
@@ -181,7 +181,7 @@ fn bar(area: &[usize], width: usize) -> Option<Bar> {
     let (middle, half) = ((xx + yy) / 2.0, libm::hypot((xx - yy) / 2.0, xy));
     // A bar of length l has the variance l²/12 along it.
     let extent = |moment: f64| (12.0 * moment.max(0.0) / count).sqrt();
-    Some(Bar {
+    Some(SourceStreak {
         // y points down; angles are counted as seen.
         angle_rad: -libm::atan2(2.0 * xy, xx - yy) / 2.0,
         length_px: extent(middle + half),

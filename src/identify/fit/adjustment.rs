@@ -76,7 +76,7 @@ pub(super) type Lanes = [f64; LANES];
 pub(super) struct Adjustment<'a, const P: usize> {
     pub stars: &'a [MeasuredStar],
     /// The camera that the next step starts from, and its attitude.
-    predictor: Predictor,
+    predictor: PositionPredictor,
     /// The terms that are fitted.
     model: Option<DistortionModel>,
     prior: Prior<'a>,
@@ -133,14 +133,14 @@ pub(super) struct EquationRows<const P: usize> {
 
 /// The normal equations, summed over the stars of each lane: every candidate is fitted, and stars side by side
 /// are faster than one after the other, as in `base::least_squares`.
-struct Sums<const P: usize> {
+struct LaneNormalEquations<const P: usize> {
     /// Lower triangle.
     block: [[Lanes; P]; P],
     vector: [Lanes; P],
     misfit: Lanes,
 }
 
-impl<const P: usize> Sums<P> {
+impl<const P: usize> LaneNormalEquations<P> {
     #[inline(always)]
     fn add(&mut self, rows: &EquationRows<P>) {
         for (axis, (terms, rhs)) in rows.terms.iter().zip(&rows.rhs).enumerate() {
@@ -186,7 +186,7 @@ pub(super) struct Normal<const P: usize> {
 
 /// Predicts where stars are, with the derivatives by all parameters.
 #[derive(Clone, Copy)]
-pub(crate) struct Predictor {
+pub(crate) struct PositionPredictor {
     camera: CameraModel,
     /// ICRS to the axes of its lens.
     icrs_to_lens: Rotation<Icrs, Camera>,
@@ -195,7 +195,7 @@ pub(crate) struct Predictor {
 }
 
 /// Where a star is predicted.
-pub(crate) struct Prediction {
+pub(crate) struct PredictedPosition {
     /// Derivatives by the turn and ln f.
     pub by_pose: [[f64; POSE_PARAMETERS]; 2],
     /// The place, and its derivatives by the terms of the lens.
@@ -204,7 +204,7 @@ pub(crate) struct Prediction {
     ideal: [f64; 2],
 }
 
-impl Prediction {
+impl PredictedPosition {
     /// The monomials of an irregular distortion there.
     fn monomials(&self) -> [f64; MONOMIALS] {
         monomials(self.ideal)
@@ -223,7 +223,7 @@ impl Prediction {
     }
 }
 
-impl Predictor {
+impl PositionPredictor {
     /// The stars as seen by `camera` in this attitude, with the terms of `model` alone.
     pub fn new(
         camera: &CameraModel,
@@ -286,7 +286,7 @@ impl Predictor {
 
     /// `None` if the star is not imaged.
     #[inline(always)]
-    pub fn predict(&self, icrs: &UnitVector<Icrs>) -> Option<Prediction> {
+    pub fn predict(&self, icrs: &UnitVector<Icrs>) -> Option<PredictedPosition> {
         let f = self.camera.focal_length_px();
         let direction = self.icrs_to_lens.apply(icrs);
         let projected = self.camera.projection().project(&direction)?;
@@ -299,7 +299,7 @@ impl Predictor {
             [by_turn(0), by_turn(1), by_turn(2), by_ln_f]
         });
         let radius_px = self.distortion.radius_px();
-        Some(Prediction {
+        Some(PredictedPosition {
             by_pose,
             observed,
             ideal: ideal.map(|along| along / radius_px),
@@ -317,7 +317,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
     ) -> Self {
         Self {
             stars,
-            predictor: Predictor::new(camera, icrs_to_camera, model),
+            predictor: PositionPredictor::new(camera, icrs_to_camera, model),
             model,
             prior: Prior::Usual,
         }
@@ -371,13 +371,13 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             rhs: [[0.0; LANES]; 2],
             residuals: [[0.0; LANES]; 2],
         };
-        let Predictor {
+        let PositionPredictor {
             camera, distortion, ..
         } = &self.predictor;
         let known = distortion.coefficients_px();
         for (lane, star) in stars.iter().enumerate().take(LANES) {
             let prediction = self.predictor.predict(&star.icrs)?;
-            let Prediction {
+            let PredictedPosition {
                 by_pose, observed, ..
             } = &prediction;
             let offset = camera.offset_of(&star.pixel);
@@ -601,8 +601,8 @@ pub(super) fn all_residuals_px<const P: usize>(
 
 /// The sums of the normal equations; `None` if a star is not imaged.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums<const P: usize>(adjustment: &Adjustment<P>) -> Option<Sums<P>> {
-    let mut sums = Sums {
+fn sums<const P: usize>(adjustment: &Adjustment<P>) -> Option<LaneNormalEquations<P>> {
+    let mut sums = LaneNormalEquations {
         block: [[[0.0; LANES]; P]; P],
         vector: [[0.0; LANES]; P],
         misfit: [0.0; LANES],

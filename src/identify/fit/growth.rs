@@ -7,7 +7,9 @@
 //! that are predicted so well that chance seldom puts a detection there are paired, and only a step
 //! beyond those that agree: a lens that is wrong out there finds chance pairs and follows them.
 
-use super::adjustment::{Adjustment, MeasuredStar, POSE_PARAMETERS, Prediction, Predictor};
+use super::adjustment::{
+    Adjustment, MeasuredStar, POSE_PARAMETERS, PositionPredictor, PredictedPosition,
+};
 use super::lens_choice::with_projection;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::least_squares::huber_sigma;
@@ -103,13 +105,13 @@ pub struct Growth {
     predicted: Vec<PredictedStar>,
     detections: PointGrid,
     stars: Vec<MeasuredStar>,
-    expected: Vec<ExpectedStar>,
+    expected: Vec<WellPredictedStar>,
     differences_mag: Vec<f64>,
 }
 
 /// A star that is predicted well.
 #[derive(Debug, Clone, Copy)]
-struct ExpectedStar {
+struct WellPredictedStar {
     /// Its angle from the axis, in radians.
     from_axis_rad: f64,
     /// Its angle from the middle of the seed, in radians.
@@ -121,13 +123,13 @@ struct ExpectedStar {
 
 /// The part of the sky in which stars are paired.
 #[derive(Debug, Clone, Copy)]
-struct Reach {
+struct PairedRegion {
     centre: UnitVector<Icrs>,
     radius_rad: f64,
 }
 
 /// A lens, its attitude, and the covariance of all parameters.
-struct Fitted {
+struct FittedCamera {
     camera: CameraModel,
     icrs_to_camera: Rotation<Icrs, Camera>,
     covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
@@ -187,8 +189,8 @@ impl Growth {
     fn pair(
         &mut self,
         problem: Problem,
-        fitted: &Fitted,
-        reach: &Reach,
+        fitted: &FittedCamera,
+        reach: &PairedRegion,
         zero_point_mag: f64,
     ) -> f64 {
         let field = problem.field;
@@ -204,7 +206,7 @@ impl Growth {
             v_mag: f64::NEG_INFINITY,
         };
         hypothesis.predict_at_least(problem, depth, &mut self.around, &mut self.predicted);
-        let predictor = Predictor::new(&fitted.camera, &fitted.icrs_to_camera, Some(MODEL));
+        let predictor = PositionPredictor::new(&fitted.camera, &fitted.icrs_to_camera, Some(MODEL));
         let diagonal_px = libm::hypot(field.width_px, field.height_px);
         let density_px2 = field.stars.len() as f64 / (field.width_px * field.height_px);
         self.stars.clear();
@@ -228,7 +230,7 @@ impl Growth {
                 continue;
             }
             let found = self.nearest(problem, &hypothesis, star, radius_px);
-            self.expected.push(ExpectedStar {
+            self.expected.push(WellPredictedStar {
                 from_axis_rad: direction.angle_to(&UnitVector::BORESIGHT),
                 from_seed_rad,
                 chance,
@@ -279,10 +281,10 @@ impl Growth {
     }
 
     /// The angle, of these of the stars, up to which more of them agree than by chance.
-    fn known_to_rad(&self, angle_rad: impl Fn(&ExpectedStar) -> f64) -> Option<f64> {
+    fn known_to_rad(&self, angle_rad: impl Fn(&WellPredictedStar) -> f64) -> Option<f64> {
         let rings = (PI / RING_RAD).ceil() as usize;
         let is_known = |ring: usize| {
-            let within = |star: &&ExpectedStar| (angle_rad(star) / RING_RAD) as usize == ring;
+            let within = |star: &&WellPredictedStar| (angle_rad(star) / RING_RAD) as usize == ring;
             let of_ring = self.expected.iter().filter(within);
             let (mut stars, mut found, mut chance) = (0, 0, 0.0);
             for star in of_ring {
@@ -300,10 +302,10 @@ impl Growth {
     }
 }
 
-impl Fitted {
+impl FittedCamera {
     /// Largest standard error of a predicted place along an axis, in pixels.
-    fn sigma_px(&self, prediction: &Prediction) -> f64 {
-        let Prediction {
+    fn sigma_px(&self, prediction: &PredictedPosition) -> f64 {
+        let PredictedPosition {
             by_pose, observed, ..
         } = prediction;
         let variance = |axis: usize| {
@@ -316,10 +318,10 @@ impl Fitted {
 }
 
 /// The seed, and a step around it.
-fn reach_of(seed: &Seed) -> Reach {
+fn reach_of(seed: &Seed) -> PairedRegion {
     let centre = seed.centre;
     let angles = seed.stars.iter().map(|star| star.icrs.angle_to(&centre));
-    Reach {
+    PairedRegion {
         centre,
         radius_rad: angles.fold(0.0, f64::max) + STEP_RAD,
     }
@@ -370,14 +372,14 @@ fn fit(
     stars: &[MeasuredStar],
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
-) -> Option<Fitted> {
+) -> Option<FittedCamera> {
     if stars.len() < MIN_STARS {
         return None;
     }
     let adjustment = Adjustment::<PARAMETERS>::new(stars, camera, icrs_to_camera, Some(MODEL));
     let mut adjustment = adjustment.followed();
     let normal = adjustment.converge(CONVERGED)?;
-    Some(Fitted {
+    Some(FittedCamera {
         camera: *adjustment.camera(),
         icrs_to_camera: adjustment.icrs_to_camera(),
         covariance: normal.root.inverse(),

@@ -3,7 +3,7 @@
 //! The normal equations are sparse: the attitude of a frame meets the lens and no other attitude.
 //! Attitudes are eliminated frame by frame, and what is left are the equations of the lens.
 
-use super::adjustment::{KnownAxis, MeasuredStar, Predictor, USUAL_TERMS, usual_term_px};
+use super::adjustment::{KnownAxis, MeasuredStar, PositionPredictor, USUAL_TERMS, usual_term_px};
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::least_squares::LinearFit;
 use crate::camera::{CameraModel, Distortion, DistortionModel};
@@ -49,7 +49,8 @@ pub(crate) fn fit_jointly(
         camera = lens.camera;
         axis = Some(KnownAxis::of(&camera, [0.0; 2]));
     }
-    let predictor = |frame: &JointFrame| Predictor::new(&camera, &frame.icrs_to_camera, model);
+    let predictor =
+        |frame: &JointFrame| PositionPredictor::new(&camera, &frame.icrs_to_camera, model);
     let joint = Joint {
         frames,
         predictors: frames.iter().map(predictor).collect(),
@@ -65,7 +66,7 @@ pub(crate) fn residuals_px(
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> Option<Vec<[f64; 2]>> {
-    let predictor = Predictor::new(camera, icrs_to_camera, camera.distortion_model());
+    let predictor = PositionPredictor::new(camera, icrs_to_camera, camera.distortion_model());
     stars
         .iter()
         .map(|star| residual_px(&predictor, star))
@@ -88,7 +89,7 @@ pub(crate) fn lens_pulls(frames: &[JointFrame], fit: &JointFit) -> Option<Vec<Le
     let parameters = fit.covariance.nrows();
     let mut row = vec![0.0; 3 + parameters];
     let of_frame = |(frame, attitude): (&JointFrame, &Rotation<Icrs, Camera>)| {
-        let predictor = Predictor::new(&fit.camera, attitude, model);
+        let predictor = PositionPredictor::new(&fit.camera, attitude, model);
         let mut vector = DVector::zeros(parameters);
         let mut information = DMatrix::zeros(parameters, parameters);
         let mut sums = FrameSums::new(parameters);
@@ -112,7 +113,7 @@ pub(crate) fn fit_scale(
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
 ) -> Option<[f64; 2]> {
-    let predictor = Predictor::new(camera, icrs_to_camera, camera.distortion_model());
+    let predictor = PositionPredictor::new(camera, icrs_to_camera, camera.distortion_model());
     let mut fit = LinearFit::new();
     for star in stars {
         let by_pose = predictor.predict(&star.icrs)?.by_pose;
@@ -127,7 +128,7 @@ pub(crate) fn fit_scale(
     Some([change[3], covariance[(3, 3)].sqrt()])
 }
 
-fn residual_px(predictor: &Predictor, star: &MeasuredStar) -> Option<[f64; 2]> {
+fn residual_px(predictor: &PositionPredictor, star: &MeasuredStar) -> Option<[f64; 2]> {
     let predicted = predictor.predict(&star.icrs)?.observed.at;
     let [u, v] = predictor.camera().offset_of(&star.pixel);
     Some([u - predicted[0], v - predicted[1]])
@@ -136,7 +137,7 @@ fn residual_px(predictor: &Predictor, star: &MeasuredStar) -> Option<[f64; 2]> {
 /// The frames of a joint fit at its present lens and attitudes.
 struct Joint<'a> {
     frames: &'a [JointFrame],
-    predictors: Vec<Predictor>,
+    predictors: Vec<PositionPredictor>,
     model: Option<DistortionModel>,
     axis: Option<KnownAxis>,
 }
@@ -159,7 +160,7 @@ struct JointNormal {
 }
 
 /// A step: of the lens, and of each attitude.
-struct Step {
+struct JointStep {
     lens: DVector<f64>,
     turns: Vec<Vector3<f64>>,
 }
@@ -185,7 +186,12 @@ impl Joint<'_> {
     }
 
     /// Takes a share of a step that makes the fit better; `None` where none does.
-    fn improved(&mut self, normal: &JointNormal, step: &Step, share: f64) -> Option<JointNormal> {
+    fn improved(
+        &mut self,
+        normal: &JointNormal,
+        step: &JointStep,
+        share: f64,
+    ) -> Option<JointNormal> {
         let before = self.predictors.clone();
         let mut share = share;
         while share > MIN_SHARE {
@@ -205,7 +211,7 @@ impl Joint<'_> {
         1 + self.model.map_or(0, DistortionModel::terms)
     }
 
-    fn take(&mut self, step: &Step, share: f64) {
+    fn take(&mut self, step: &JointStep, share: f64) {
         for (predictor, turn) in self.predictors.iter_mut().zip(&step.turns) {
             let changes_px = step.lens.iter().skip(1).map(|change| share * change);
             predictor.change(turn * share, share * step.lens[0], changes_px, self.model);
@@ -266,7 +272,7 @@ impl Joint<'_> {
             attitudes: self
                 .predictors
                 .iter()
-                .map(Predictor::icrs_to_camera)
+                .map(PositionPredictor::icrs_to_camera)
                 .collect(),
             covariance: normal.root.inverse(),
             residuals_px: residuals_px?,
@@ -294,7 +300,7 @@ impl FrameSums {
     /// `row` as a buffer. Returns its squared residual in standard errors; `None` if it is not imaged.
     fn add(
         &mut self,
-        predictor: &Predictor,
+        predictor: &PositionPredictor,
         star: &MeasuredStar,
         row: &mut [f64],
         matrix: &mut DMatrix<f64>,
@@ -353,20 +359,20 @@ impl FrameBlock {
 }
 
 impl JointNormal {
-    fn step(&self) -> Step {
+    fn step(&self) -> JointStep {
         let lens = self.root.solve(&self.vector);
         let turn = |frame: &FrameBlock| {
             let rest = frame.vector - &frame.coupling * &lens;
             frame.root.solve(&rest)
         };
-        Step {
+        JointStep {
             turns: self.frames.iter().map(turn).collect(),
             lens,
         }
     }
 
     /// By how much a step should make the misfit less.
-    fn gain(&self, step: &Step) -> f64 {
+    fn gain(&self, step: &JointStep) -> f64 {
         let of_frames = self.frames.iter();
         let of_frames = of_frames.map(|frame| frame.vector.dot(&frame.root.solve(&frame.vector)));
         step.lens.dot(&self.vector) + of_frames.sum::<f64>()

@@ -34,14 +34,14 @@ const TAIL_EQUATIONS: f64 = 8.0;
 
 /// A kind of lens.
 #[derive(Clone, Copy, PartialEq)]
-pub struct Lens {
+pub struct LensKind {
     /// The ideal lens.
     pub projection: Projection,
     /// The terms of its distortion.
     pub model: Option<DistortionModel>,
 }
 
-impl Lens {
+impl LensKind {
     /// That of a camera.
     pub fn of(camera: &CameraModel) -> Self {
         Self {
@@ -55,15 +55,15 @@ impl Lens {
 #[derive(Clone, Copy)]
 pub struct ChosenLens {
     /// The lens.
-    pub lens: Lens,
+    pub lens: LensKind,
     /// Covariance of the pose about that of the lens, as in [`CameraFit`](super::CameraFit), among projections that
     /// explain the stars nearly as well.
     pub covariance: Matrix4<f64>,
 }
 
-impl From<Lens> for ChosenLens {
+impl From<LensKind> for ChosenLens {
     /// A lens without rivals.
-    fn from(lens: Lens) -> Self {
+    fn from(lens: LensKind) -> Self {
         Self {
             lens,
             covariance: Matrix4::zeros(),
@@ -73,7 +73,7 @@ impl From<Lens> for ChosenLens {
 
 /// A projection with the distortion that it needs.
 struct Rival {
-    lens: Lens,
+    lens: LensKind,
     /// −2 ln of its likelihood, with penalties.
     misfit: f64,
     fitted: Hypothesis,
@@ -164,14 +164,14 @@ impl LensChoice<'_> {
         let model = hypothesis.camera.distortion_model();
         let (model, misfit) = linear.unwrap_or((model, f64::INFINITY));
         if is_regular || richest <= DistortionModel::Radial || model >= Some(least) {
-            return Lens { projection, model }.into();
+            return LensKind { projection, model }.into();
         }
         // A lens that is far from the present one shows what it is worth only once it is fitted.
         let fitted = self.fitted_lens(&hypothesis, projection);
         let richer = fitted.and_then(|fitted| self.choose_model(&fitted, richest));
         let better = richer.filter(|(richer, less)| *richer > model && *less < misfit);
         let model = better.map_or(model, |(model, _)| model);
-        Lens { projection, model }.into()
+        LensKind { projection, model }.into()
     }
 
     /// The lens whose projection, with the distortion that it needs, predicts left-out stars best. One
@@ -198,13 +198,13 @@ impl LensChoice<'_> {
                 continue;
             }
             rivals.push(Rival {
-                lens: Lens { projection, model },
+                lens: LensKind { projection, model },
                 misfit: misfit + worth_a_projection(projection),
                 fitted,
             });
         }
         let best = rivals.iter().min_by(|a, b| a.misfit.total_cmp(&b.misfit));
-        best.map_or(Lens::of(&hypothesis.camera).into(), |best| ChosenLens {
+        best.map_or(LensKind::of(&hypothesis.camera).into(), |best| ChosenLens {
             lens: best.lens,
             covariance: best.covariance(&rivals),
         })

@@ -13,7 +13,7 @@ mod predictions;
 mod refine;
 
 pub use adjustment::{MeasuredStar, POSE_PARAMETERS};
-pub(crate) use adjustment::{Prediction, Predictor};
+pub(crate) use adjustment::{PositionPredictor, PredictedPosition};
 pub use camera_fit::{CameraFit, fit_camera, fit_known_lens};
 pub(crate) use growth::{Growth, Seed};
 pub(crate) use joint_fit::{

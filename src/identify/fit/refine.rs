@@ -5,7 +5,7 @@
 
 use super::camera_fit::fit_with_unshown_terms;
 use super::lens_choice::{
-    ChosenLens, Lens, LensChoice, depend_on_place, is_affordable, with_projection,
+    ChosenLens, LensChoice, LensKind, depend_on_place, is_affordable, with_projection,
 };
 use super::{CameraFit, MeasuredStar, fit_camera, fit_known_lens};
 use crate::base::coords::{Camera, Icrs, Rotation};
@@ -14,7 +14,7 @@ use crate::base::statistics::median;
 use crate::camera::{CameraModel, DistortionModel, KnownLens};
 use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::hypothesis::{Hypothesis, Problem};
-use crate::identify::naming::{Blends, Candidate, Naming, Stars};
+use crate::identify::naming::{Blends, NameCandidate, Naming, NamingStars};
 use crate::identify::pairing::{Pair, Pairing};
 use crate::identify::predict::{PredictedStar, Surroundings};
 use nalgebra::Matrix4;
@@ -96,13 +96,13 @@ pub struct NamingStart {
 
 /// A hypothesis, and the lens to fit from there.
 #[derive(Clone, Copy)]
-struct Guess<'a> {
+struct RefineStart<'a> {
     hypothesis: &'a Hypothesis,
-    lens: Lens,
+    lens: LensKind,
     excess_sigma_px: f64,
 }
 
-impl Guess<'_> {
+impl RefineStart<'_> {
     /// Camera and attitude to start from.
     fn start(&self) -> (CameraModel, Rotation<Icrs, Camera>) {
         with_projection(self.hypothesis, self.lens.projection)
@@ -166,10 +166,10 @@ impl Refiner {
         if start.sceptical && !self.is_remarkable(problem, observed.len(), radius_px) {
             return None;
         }
-        let mut lens = Lens::of(&hypothesis.camera);
+        let mut lens = LensKind::of(&hypothesis.camera);
         let mut current = self.fitted(
             problem,
-            &Guess {
+            &RefineStart {
                 hypothesis,
                 lens,
                 excess_sigma_px: 0.0,
@@ -195,7 +195,7 @@ impl Refiner {
                 std::mem::swap(&mut self.pairs, &mut self.before);
                 is_lens_chosen = true;
             }
-            let mut guess = Guess {
+            let mut guess = RefineStart {
                 hypothesis: &hypothesis,
                 lens,
                 excess_sigma_px: current.excess_sigma_px,
@@ -223,14 +223,14 @@ impl Refiner {
     ) -> Option<Refined> {
         let hypothesis = settled.hypothesis();
         hypothesis.predict_all(problem, &mut self.around, &mut self.predicted);
-        let stars = Stars {
+        let stars = NamingStars {
             field: problem.field,
             predicted: &self.predicted,
         };
         self.naming
             .start(stars, hypothesis.zero_point_mag, wanted.by_place);
         self.blends.start(self.predicted.len());
-        let mut lens = Lens::of(&hypothesis.camera);
+        let mut lens = LensKind::of(&hypothesis.camera);
         lens.model = lens.model.max(wanted.min_distortion);
         let mut current = *settled;
         let mut among_lenses = Matrix4::zeros();
@@ -242,7 +242,7 @@ impl Refiner {
             self.name(problem, &current, round == 0);
             self.take_names(wanted.most_chance);
             let settled = self.are_pairs_the_same();
-            let mut guess = Guess {
+            let mut guess = RefineStart {
                 hypothesis: &hypothesis,
                 lens,
                 excess_sigma_px: current.excess_sigma_px,
@@ -298,7 +298,7 @@ impl Refiner {
     /// Computes the probabilities of all candidates for a name under `current`.
     fn name(&mut self, problem: Problem, current: &Refined, is_first: bool) {
         let hypothesis = current.hypothesis();
-        let stars = Stars {
+        let stars = NamingStars {
             field: problem.field,
             predicted: &self.predicted,
         };
@@ -326,7 +326,7 @@ impl Refiner {
         self.pairs.clear();
         let sure = self.naming.candidates.iter();
         let sure = sure.filter(|candidate| candidate.p_chance <= most_chance);
-        self.pairs.extend(sure.map(Candidate::pair));
+        self.pairs.extend(sure.map(NameCandidate::pair));
     }
 
     fn pair_up(
@@ -364,7 +364,7 @@ impl Refiner {
     }
 
     /// The fit to the pairs, from `guess`.
-    fn fitted(&mut self, problem: Problem, guess: &Guess) -> Option<Refined> {
+    fn fitted(&mut self, problem: Problem, guess: &RefineStart) -> Option<Refined> {
         self.measure(problem, guess.excess_sigma_px);
         let fit = match self.known_lens(problem.field).cloned() {
             Some(lens) => self.fit_known_lens(&lens, guess.hypothesis),
@@ -390,7 +390,7 @@ impl Refiner {
     }
 
     /// The fit of a lens to the stars.
-    fn fit_lens(&mut self, guess: &Guess) -> Option<CameraFit> {
+    fn fit_lens(&mut self, guess: &RefineStart) -> Option<CameraFit> {
         let model = guess.lens.model;
         let affordable = model.filter(|m| is_affordable(*m, self.stars.len()));
         let (camera, icrs_to_camera) = guess.start();
@@ -445,7 +445,7 @@ impl Refiner {
         richest: DistortionModel,
     ) -> ChosenLens {
         if self.known_lens(problem.field).is_some() {
-            return Lens::of(&current.fit.camera).into();
+            return LensKind::of(&current.fit.camera).into();
         }
         self.measure(problem, current.excess_sigma_px);
         let mut choice = LensChoice {

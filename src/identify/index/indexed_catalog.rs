@@ -3,7 +3,7 @@
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
 use super::packed_vectors::PackedVectors;
-use super::table::{CHUNKS, Place, Triangle};
+use super::table::{CHUNKS, Triangle, TriangleRange};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
@@ -166,7 +166,11 @@ impl<'a> IndexedCatalog<'a> {
 
     /// The triangles of a size class at a place.
     #[inline]
-    pub(in crate::identify) fn triangles_at(&self, class: usize, place: &Place) -> &[Triangle] {
+    pub(in crate::identify) fn triangles_at(
+        &self,
+        class: usize,
+        place: &TriangleRange,
+    ) -> &[Triangle] {
         let chunk = place.chunk as usize;
         place.triangles(self.triangles.chunk(self.stars(), class, chunk))
     }

@@ -17,5 +17,5 @@ pub use cache::CacheError;
 pub use cache_directory::cache_directory;
 pub use indexed_catalog::IndexedCatalog;
 pub use packed_vectors::PackedVectors;
-pub use table::{Place, Triangle, WantedShape};
+pub use table::{Triangle, TriangleRange, WantedShape};
 pub use triangle::TriangleShape;

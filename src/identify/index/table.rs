@@ -199,7 +199,7 @@ impl SizeClass {
     }
 
     /// Where the triangles of a shape are.
-    pub fn places(&self, shape: &WantedShape) -> impl Iterator<Item = Place> {
+    pub fn places(&self, shape: &WantedShape) -> impl Iterator<Item = TriangleRange> {
         let [middle, shortest] = shape.ratios;
         let columns = span(column_of, shortest, shape.tolerance);
         span(row_of, middle, shape.tolerance).flat_map(move |row| {
@@ -210,7 +210,7 @@ impl SizeClass {
                 let before = self.cell_starts[cells.start];
                 let from = self.cell_starts[first.max(cells.start)] - before;
                 let to = self.cell_starts[cells.end.min(last + 1)] - before;
-                let place = Place {
+                let place = TriangleRange {
                     chunk: chunk as u32,
                     from,
                     to,
@@ -223,14 +223,14 @@ impl SizeClass {
 
 /// A part of a chunk of a class: triangles `from..to`.
 #[derive(Debug, Clone, Copy)]
-pub struct Place {
+pub struct TriangleRange {
     /// The chunk.
     pub chunk: u32,
     from: u32,
     to: u32,
 }
 
-impl Place {
+impl TriangleRange {
     /// The triangles there. A damaged chunk may have fewer than its table says.
     #[inline]
     pub fn triangles<'a>(&self, chunk: &'a [Triangle]) -> &'a [Triangle] {

@@ -129,7 +129,7 @@ pub fn calibrate(
             stars: frames.iter().map(LensFrame::stars).sum(),
             frames: frames.len(),
         };
-        let fitted = Fitted::new(&frames).ok_or(not_determined.clone())?;
+        let fitted = FittedLens::new(&frames).ok_or(not_determined.clone())?;
         let misfits = fitted.misfits();
         if misfits.is_empty() {
             return fitted.calibration(frames, left_out).ok_or(not_determined);
@@ -197,9 +197,9 @@ fn most_alike(focal_lengths_px: &[f64]) -> Vec<f64> {
 }
 
 /// A lens fitted to frames.
-struct Fitted {
+struct FittedLens {
     fit: JointFit,
-    errors: Errors,
+    errors: ExcessErrors,
     /// The stars with all of their errors.
     weighted: Vec<JointFrame>,
     repeats: Repeats,
@@ -208,7 +208,7 @@ struct Fitted {
     distances_px: Vec<f64>,
 }
 
-impl Fitted {
+impl FittedLens {
     fn new(frames: &[LensFrame]) -> Option<Self> {
         let stated: Vec<JointFrame> = frames.iter().map(|frame| frame.joint.clone()).collect();
         let repeats = Repeats::new(frames);
@@ -380,7 +380,7 @@ fn rms_of<'a>(residuals: impl Iterator<Item = &'a [f64; 2]>) -> f64 {
 
 /// What errors the stars have besides the stated ones.
 #[derive(Debug, Clone, Copy)]
-struct Errors {
+struct ExcessErrors {
     /// On each axis, in pixels, what the stated ones lack to explain the residuals.
     excess_sigma_px: f64,
     /// What frames of one direction have in common.
@@ -394,7 +394,7 @@ fn reweighed(
     stated: &[JointFrame],
     fit: &JointFit,
     repeats: &Repeats,
-) -> (Errors, Vec<JointFrame>) {
+) -> (ExcessErrors, Vec<JointFrame>) {
     let excess_sigma_px = excess_sigma_px(stated, fit);
     let common = repeats.common_error(stated, fit, excess_sigma_px);
     let alone = stated.iter().zip(&fit.residuals_px);
@@ -415,7 +415,7 @@ fn reweighed(
     let alone: Vec<Vec<StarError>> = alone.collect();
     let sigmas_px = repeats.sigmas_px(&common, &alone);
     let counted = alone.iter().flatten().zip(sigmas_px.iter().flatten());
-    let errors = Errors {
+    let errors = ExcessErrors {
         excess_sigma_px,
         common,
         independent_stars: counted

@@ -15,7 +15,7 @@ const FOLDS: usize = 5;
 
 /// A lens, and how it predicts stars that were left out.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tested {
+pub(super) struct TestedLens {
     pub projection: Projection,
     pub model: Option<DistortionModel>,
     /// Sum of the squared errors in standard errors, of which outliers have less.
@@ -32,7 +32,7 @@ pub(super) fn best_lens(
     repeats: &Repeats,
     stars: f64,
     start: &CameraModel,
-) -> Option<Tested> {
+) -> Option<TestedLens> {
     let equations = 2.0 * stars;
     let projections = if start.radius_rad() > WIDE_RAD {
         Projection::ALL.to_vec()
@@ -56,9 +56,9 @@ pub(super) fn best_lens(
 }
 
 /// The simplest distortion that no richer one clearly surpasses.
-fn best_model(frames: &Parted, start: &CameraModel, stars: f64) -> Option<Tested> {
+fn best_model(frames: &Parted, start: &CameraModel, stars: f64) -> Option<TestedLens> {
     let equations = 2.0 * stars;
-    let mut best: Option<Tested> = None;
+    let mut best: Option<TestedLens> = None;
     let models = DistortionModel::ALL.map(Some);
     for model in std::iter::once(None).chain(models) {
         if model.is_some_and(|model| !is_affordable(model, stars as usize)) {
@@ -67,7 +67,7 @@ fn best_model(frames: &Parted, start: &CameraModel, stars: f64) -> Option<Tested
         let Some(tested) = test(frames, start, model) else {
             continue;
         };
-        let is_better = |best: &Tested| {
+        let is_better = |best: &TestedLens| {
             let wanted = model.map_or(0.0, |model| least_gain(model, best.model));
             equations * libm::log(best.chi_sq / tested.chi_sq) > wanted
         };
@@ -111,7 +111,11 @@ impl Parted<'_> {
 }
 
 /// How a lens predicts the stars that are left out.
-fn test(parted: &Parted, start: &CameraModel, model: Option<DistortionModel>) -> Option<Tested> {
+fn test(
+    parted: &Parted,
+    start: &CameraModel,
+    model: Option<DistortionModel>,
+) -> Option<TestedLens> {
     let whole = fit_jointly(parted.frames, start, model)?;
     let (mut chi_sq, mut squares) = (0.0, Vec::new());
     for fold in 0..FOLDS {
@@ -126,7 +130,7 @@ fn test(parted: &Parted, start: &CameraModel, model: Option<DistortionModel>) ->
             }
         }
     }
-    Some(Tested {
+    Some(TestedLens {
         projection: start.projection(),
         model,
         chi_sq,

@@ -18,7 +18,7 @@ use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::catalog::StarIndex;
 use crate::catalog::sky_grid::{GridStar, chord_of};
 use crate::identify::hypothesis::{Hypothesis, Problem};
-use crate::identify::naming::{Candidate, position_density};
+use crate::identify::naming::{NameCandidate, position_density};
 
 /// Stars fainter than another by more move its centroid by less than a hundredth of the spot.
 const FAINTER_MAG: f32 = 4.5;
@@ -136,7 +136,7 @@ impl Blends {
         problem: Problem,
         hypothesis: &Hypothesis,
         taken: impl Iterator<Item = StarIndex>,
-        candidates: &mut [Candidate],
+        candidates: &mut [NameCandidate],
     ) {
         let Some(spot_sigma_px) = problem.field.spot_sigma_px else {
             return;
@@ -205,7 +205,7 @@ impl Blends {
     fn blend_of(
         &mut self,
         view: &BlendView,
-        candidate: &Candidate,
+        candidate: &NameCandidate,
         detected: &PixelPoint,
     ) -> Option<Blend> {
         let index = candidate.star;

@@ -7,7 +7,7 @@ use crate::identify::predict::PredictedStar;
 
 /// An observed star and the catalogue star that it may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Candidate {
+pub struct NameCandidate {
     /// Position in [`StarField::stars`](crate::identify::StarField::stars).
     pub observed: usize,
     /// Position in the list of predicted stars.
@@ -38,7 +38,7 @@ pub struct Candidate {
     pub p_chance: f64,
 }
 
-impl Candidate {
+impl NameCandidate {
     /// A candidate whose star is single. `sigma_px` and `gate_px` are those of the observed star.
     pub fn new(near: &NearPair, predicted: &PredictedStar, sigma_px: f64, gate_px: f64) -> Self {
         Self {

@@ -23,19 +23,19 @@ const PRIOR_AROUND: f64 = 1.0;
 
 /// The probability of each predicted star that it is observed. Its buffers are reused.
 #[derive(Debug, Default)]
-pub struct DetectionShares {
+pub struct DetectionProbabilities {
     /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
     shares: Vec<f64>,
     /// How much more likely stars are observed at the place of each one than on average; as many.
     visibility: Vec<f64>,
-    steps: Vec<Step>,
-    scales: [Scale; CELLS.len()],
+    steps: Vec<CompletenessStep>,
+    scales: [ScaleCounts; CELLS.len()],
     scratch: Vec<f64>,
 }
 
 /// Stars that are observed with the same probability.
 #[derive(Debug, Clone, Copy)]
-struct Step {
+struct CompletenessStep {
     /// Number of stars, and how many of them are observed.
     stars: f64,
     observed: f64,
@@ -43,7 +43,7 @@ struct Step {
 
 /// What is counted on one scale.
 #[derive(Debug, Default)]
-struct Scale {
+struct ScaleCounts {
     /// The cell of each predicted star.
     places: Vec<u32>,
     /// Stars that are observed, and that are expected to be, in the cells.
@@ -61,7 +61,7 @@ pub fn odds_of(own: f64, apparent: f64, visibility: f64) -> [f64; 2] {
     [own / (1.0 - own), apparent / (1.0 - own)]
 }
 
-impl DetectionShares {
+impl DetectionProbabilities {
     /// Nothing is known of `stars` predicted stars.
     pub fn start(&mut self, stars: usize) {
         self.shares.clear();
@@ -111,7 +111,7 @@ impl DetectionShares {
             }
         }
         self.shares.clear();
-        for &Step { stars, observed } in &self.steps {
+        for &CompletenessStep { stars, observed } in &self.steps {
             let share = (observed + 0.5 * PRIOR_STARS) / (stars + PRIOR_STARS);
             let end = self.shares.len() + stars as usize;
             self.shares.resize(end, share);
@@ -121,7 +121,7 @@ impl DetectionShares {
 
     /// Adds a star, and pools the steps that rise.
     fn add_step(&mut self, observed: f64) {
-        let mut step = Step {
+        let mut step = CompletenessStep {
             stars: 1.0,
             observed,
         };
@@ -129,7 +129,7 @@ impl DetectionShares {
             if last.observed * step.stars > step.observed * last.stars {
                 break;
             }
-            step = Step {
+            step = CompletenessStep {
                 stars: step.stars + last.stars,
                 observed: step.observed + last.observed,
             };
@@ -139,7 +139,7 @@ impl DetectionShares {
     }
 }
 
-impl Scale {
+impl ScaleCounts {
     /// Counts the stars in each cell and its neighbors.
     fn count(
         &mut self,
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn the_share_falls_and_pools_what_rises() {
-        let mut found = DetectionShares::default();
+        let mut found = DetectionProbabilities::default();
         let observed: Vec<f64> = [[1.0; 40], [0.0; 40]].concat();
         found.measure_shares(&observed);
         assert!(found.shares[0] > 0.95);
@@ -227,7 +227,7 @@ mod tests {
             .iter()
             .map(|s| f64::from(u8::from(!is_behind(s))))
             .collect();
-        let mut found = DetectionShares::default();
+        let mut found = DetectionProbabilities::default();
         found.measure_shares(&observed);
         found.place(&field(), &stars);
         found.measure_visibility(&field(), &observed);

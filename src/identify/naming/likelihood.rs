@@ -1,6 +1,6 @@
 //! How far apart the observed and the predicted star of a true pair lie, in position and magnitude.
 
-use super::candidate::Candidate;
+use super::candidate::NameCandidate;
 use super::packed::LANES;
 use super::packed::{Lanes, Packed};
 use crate::base::exponential::exp_of_negative;
@@ -38,7 +38,7 @@ const MEASURING_CHANCE: f64 = 0.5;
 const PRIOR_STARS: f64 = 4.0;
 
 /// Density of the distance between the stars of a true pair, per square pixel, at `distance_px`.
-pub fn position_density(candidate: &Candidate, distance_px: f64, is_saturated: bool) -> f64 {
+pub fn position_density(candidate: &NameCandidate, distance_px: f64, is_saturated: bool) -> f64 {
     let (sigma_px, gate_px) = ([candidate.sigma_px], [candidate.gate_px]);
     let saturated = [f64::from(u8::from(is_saturated))];
     position_densities(&[distance_px], &sigma_px, &gate_px, &saturated)[0]

@@ -32,14 +32,14 @@ mod packed;
 mod unrelated;
 
 pub use blends::Blends;
-pub use candidate::Candidate;
+pub use candidate::NameCandidate;
 pub use likelihood::position_density;
 
 use crate::identify::field::{ObservedStar, Photometry, StarField};
 use crate::identify::hypothesis::Hypothesis;
 use crate::identify::pairing::Pairing;
 use crate::identify::predict::PredictedStar;
-use completeness::DetectionShares;
+use completeness::DetectionProbabilities;
 use likelihood::MagnitudeRelation;
 use odds::{OddsInputs, pack, set_chances, set_odds};
 use packed::Packed;
@@ -62,7 +62,7 @@ const RARE_GATE_SHARE: f64 = 0.01;
 #[derive(Debug, Default)]
 pub struct Naming {
     /// The candidates, in the order of the observed stars.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<NameCandidate>,
     packed: Vec<Packed>,
     /// The sum of odds of each observed star, and of each predicted star, and of empty lanes.
     odds_of_observed: Vec<f64>,
@@ -76,14 +76,14 @@ pub struct Naming {
     /// The share by brightness of the predicted stars as bright as each observed one.
     apparent_shares: Vec<f64>,
     by_place: bool,
-    completeness: DetectionShares,
+    completeness: DetectionProbabilities,
     unrelated: Unrelated,
     magnitudes: MagnitudeRelation,
 }
 
 /// The stars of a frame, observed and predicted, both brightest first.
 #[derive(Clone, Copy)]
-pub struct Stars<'a> {
+pub struct NamingStars<'a> {
     /// The observed stars and the frame.
     pub field: &'a StarField,
     /// The predicted stars.
@@ -95,8 +95,8 @@ impl Naming {
     ///
     /// With `by_place`, the density of unrelated detections and the share of the stars that are
     /// detected are measured from place to place, for which few stars say too little.
-    pub fn start(&mut self, stars: Stars, zero_point_mag: f64, by_place: bool) {
-        let Stars { field, predicted } = stars;
+    pub fn start(&mut self, stars: NamingStars, zero_point_mag: f64, by_place: bool) {
+        let NamingStars { field, predicted } = stars;
         self.by_place = by_place;
         self.unrelated.start(field, by_place);
         self.magnitudes = MagnitudeRelation::new(zero_point_mag, field.photometry);
@@ -112,12 +112,12 @@ impl Naming {
     /// errors lack.
     pub fn find_candidates(
         &mut self,
-        stars: Stars,
+        stars: NamingStars,
         hypothesis: &Hypothesis,
         excess_sigma_px: f64,
         pairing: &mut Pairing,
     ) {
-        let Stars { field, predicted } = stars;
+        let NamingStars { field, predicted } = stars;
         let gate = Gate::new(field, excess_sigma_px);
         let radius_px = |index: usize, star: &ObservedStar| gate.radius_px(index, star);
         let difference =
@@ -128,14 +128,14 @@ impl Naming {
             let star = &field.stars[near.observed];
             let sigma_px = gate.sigma_px(star);
             let gate_px = gate.radius_px(near.observed, star);
-            Candidate::new(near, &predicted[near.predicted], sigma_px, gate_px)
+            NameCandidate::new(near, &predicted[near.predicted], sigma_px, gate_px)
         });
         self.candidates.extend(candidates);
     }
 
     /// Computes the probabilities of the candidates.
-    pub fn compute(&mut self, stars: Stars, is_first: bool) {
-        let Stars { field, predicted } = stars;
+    pub fn compute(&mut self, stars: NamingStars, is_first: bool) {
+        let NamingStars { field, predicted } = stars;
         pack(&self.candidates, field, predicted.len(), &mut self.packed);
         if self.by_place {
             self.completeness.place(stars.field, stars.predicted);
@@ -163,7 +163,7 @@ impl Naming {
     }
 
     /// Probabilities of the candidates from what was measured in the frame.
-    fn expect(&mut self, stars: Stars) {
+    fn expect(&mut self, stars: NamingStars) {
         let (observed, predicted) = (stars.field.stars.len(), stars.predicted.len());
         self.unrelated.measure(&self.has_name[..observed]);
         self.find_apparent_shares(stars.field);
@@ -217,8 +217,8 @@ impl Naming {
     }
 
     /// What the frame shows, from the probabilities.
-    fn maximise(&mut self, stars: Stars, is_by_place: bool) {
-        let Stars { field, predicted } = stars;
+    fn maximise(&mut self, stars: NamingStars, is_by_place: bool) {
+        let NamingStars { field, predicted } = stars;
         let is_observed = &self.is_observed[..predicted.len()];
         self.completeness.measure_shares(is_observed);
         if is_by_place {

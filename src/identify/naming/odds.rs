@@ -1,6 +1,6 @@
 //! The odds of packed candidates, and their probabilities of chance.
 
-use super::candidate::Candidate;
+use super::candidate::NameCandidate;
 use super::completeness::odds_of;
 use super::likelihood::{MagnitudeRelation, position_densities};
 use super::packed::LANES;
@@ -23,7 +23,7 @@ pub struct OddsInputs<'a> {
 
 /// Packs `candidates` into `packed`, given the field and the number of predicted stars.
 pub fn pack(
-    candidates: &[Candidate],
+    candidates: &[NameCandidate],
     field: &StarField,
     predicted: usize,
     packed: &mut Vec<Packed>,
@@ -34,7 +34,7 @@ pub fn pack(
 }
 
 /// Packs a few candidates.
-fn packed_from(candidates: &[Candidate], field: &StarField, predicted: usize) -> Packed {
+fn packed_from(candidates: &[NameCandidate], field: &StarField, predicted: usize) -> Packed {
     let mut packed = Packed {
         observed: [field.stars.len() as u32; LANES],
         predicted: [predicted as u32; LANES],

@@ -23,7 +23,7 @@ pub struct Unrelated {
     area_px2: f64,
     /// The stars as bright as each one: from the first to that after the last.
     alike: Vec<(u32, u32)>,
-    scales: [Scale; CELLS.len()],
+    scales: [ScaleSurroundings; CELLS.len()],
     /// The probability of each star that it is unrelated, and the sums of all before each one: of
     /// those that are not saturated, and of those that are.
     weights: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Unrelated {
 
 /// The surroundings of the observed stars on one scale.
 #[derive(Debug, Default)]
-struct Scale {
+struct ScaleSurroundings {
     /// The cell of each star, and the area of its surroundings in square pixels.
     places: Vec<(u32, f64)>,
     /// Weights in the cells: 0 while they are not used.
@@ -133,7 +133,7 @@ impl Unrelated {
     }
 }
 
-impl Scale {
+impl ScaleSurroundings {
     fn start(&mut self, field: &StarField, grid: &FrameGrid) {
         self.cells.clear();
         self.cells.resize(grid.cells(), 0.0);

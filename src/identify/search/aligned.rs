@@ -12,7 +12,7 @@ pub struct InCamera {
 }
 
 /// A frame of a triangle in the camera and the same in the sky: where the camera points (TRIAD).
-pub struct Aligned<'a> {
+pub struct AlignedTriangle<'a> {
     /// Whether the x axis is reversed.
     pub mirrored: bool,
     /// The frame in the camera.
@@ -33,9 +33,9 @@ impl InCamera {
 
     /// The triangle aligned with that of the catalogue whose stars have these unit vectors.
     #[inline]
-    pub fn aligned(&self, sky: &[Vector3<f64>; 3]) -> Option<Aligned<'_>> {
+    pub fn aligned(&self, sky: &[Vector3<f64>; 3]) -> Option<AlignedTriangle<'_>> {
         let mirrored = self.triple * triple(sky) < 0.0;
-        Some(Aligned {
+        Some(AlignedTriangle {
             mirrored,
             of_camera: &self.frames[usize::from(mirrored)],
             of_sky: frame_of(sky)?,

@@ -40,7 +40,7 @@ const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 const NEIGHBORHOOD: f64 = 8.0;
 /// An observed and a predicted star of similar brightness.
 #[derive(Debug, Clone, Copy)]
-struct NearPair {
+struct SimilarPair {
     observed: usize,
     predicted: usize,
     /// Their distance, in pixels.
@@ -58,9 +58,9 @@ pub struct FalseAlarm {
     /// Radii of agreement, smallest first.
     radii_px: Vec<f64>,
     /// All pairs in the neighborhood of the largest radius.
-    pairs: Vec<NearPair>,
+    pairs: Vec<SimilarPair>,
     /// The pairs within the largest radius, closest first.
-    close: Vec<NearPair>,
+    close: Vec<SimilarPair>,
     /// For each observed star, the number of predicted stars of similar brightness, …
     alike: Vec<f64>,
     /// … and how many of them lie in the neighborhood, radius by radius.
@@ -97,7 +97,7 @@ fn used_up_by_fit(hypothesis: &Hypothesis, tested: usize) -> usize {
 }
 
 /// The parameters of a test.
-struct Tested<'a> {
+struct TestParameters<'a> {
     field: &'a StarField,
     /// Number of observed stars, the brightest.
     stars: usize,
@@ -140,7 +140,7 @@ impl FalseAlarm {
             self.most.resize(self.radii_px.len(), used_up);
             let tried = MAG_TOLERANCES.iter().filter(|&&mag| mag < largest_mag);
             for tolerance_mag in tried.copied().chain([largest_mag]) {
-                let tested = Tested {
+                let tested = TestParameters {
                     field,
                     stars: observed.len(),
                     tolerance_mag,
@@ -188,7 +188,7 @@ impl FalseAlarm {
                     radius -= 1;
                 }
                 let mag = f64::from(candidate.v_mag) - star.mag - hypothesis.zero_point_mag;
-                self.pairs.push(NearPair {
+                self.pairs.push(SimilarPair {
                     observed: index,
                     predicted,
                     apart_px,
@@ -208,7 +208,12 @@ impl FalseAlarm {
 
     /// Adds a test for each radius at which more stars agree than by construction, within a smaller
     /// radius or a smaller magnitude difference. As many stars in more room are no less likely.
-    fn add_tests(&mut self, hypothesis: &Hypothesis, observed: &[ObservedStar], tested: &Tested) {
+    fn add_tests(
+        &mut self,
+        hypothesis: &Hypothesis,
+        observed: &[ObservedStar],
+        tested: &TestParameters,
+    ) {
         self.count_alike(hypothesis, observed, tested.tolerance_mag);
         self.count_near(observed.len(), tested.tolerance_mag);
         let mut hits = Hits::new(self, observed.len());
@@ -242,7 +247,7 @@ impl FalseAlarm {
         let radii = self.radii_px.len();
         self.near.clear();
         self.near.resize(observed * radii, 0.0);
-        let counts = |pair: &&NearPair| pair.observed < observed && pair.mag <= tolerance_mag;
+        let counts = |pair: &&SimilarPair| pair.observed < observed && pair.mag <= tolerance_mag;
         for pair in self.pairs.iter().filter(counts) {
             self.near[pair.observed * radii + pair.radius] += 1.0;
         }
@@ -259,7 +264,7 @@ impl FalseAlarm {
     /// The probability of exactly this number is the product of all 1 − p, times the sum over all
     /// subsets of the product of their p / (1 − p). The sum is at least that of equal p, their
     /// geometric mean (Maclaurin's inequality), and ln(1 − p) is at least −p − p² for p below 0.68.
-    fn test(&mut self, radius: usize, hits: usize, tested: &Tested) -> Test {
+    fn test(&mut self, radius: usize, hits: usize, tested: &TestParameters) -> Test {
         let (radius_px, radii) = (self.radii_px[radius], self.radii_px.len());
         let frame_px = tested.field.width_px * tested.field.height_px;
         let chances = self.chances.len();
@@ -346,7 +351,7 @@ impl Hits {
 
     /// The number within `radius_px`, which must not decrease between calls; `pairs` are sorted by
     /// distance.
-    fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[NearPair]) -> usize {
+    fn within(&mut self, radius_px: f64, tolerance_mag: f64, pairs: &[SimilarPair]) -> usize {
         while let Some(pair) = pairs.get(self.done).filter(|p| p.apart_px <= radius_px) {
             let (o, p) = (pair.observed, pair.predicted);
             let is_alike = o < self.observed_taken.len() && pair.mag <= tolerance_mag;

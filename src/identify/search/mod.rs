@@ -21,5 +21,7 @@ mod windows;
 pub use plan::SearchPlan;
 pub use thinning::Thinning;
 pub use tiers::Tiers;
-pub use triangle_search::{Found, LOG10_FALSE_ALARM_LIMIT, Search, SearchBuffers};
-pub use windows::{Window, Windows};
+pub use triangle_search::{
+    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, SearchBuffers, TriangleSearch,
+};
+pub use windows::{SearchWindow, Windows};

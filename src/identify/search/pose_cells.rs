@@ -103,7 +103,7 @@ struct Poses {
 
 /// Cells of poses.
 #[derive(Debug, Default)]
-pub struct Cells {
+pub struct PoseCells {
     /// Their number in each grid.
     pub cells: [Lanes<u32>; GRIDS],
     /// Whether hints allow the poses.
@@ -112,7 +112,7 @@ pub struct Cells {
 
 /// Cells of one level of the scale.
 #[derive(Debug, Clone, Copy)]
-struct Level {
+struct ScaleLevel {
     /// Cells of the optical axis in a unit vector's coordinate of 1.
     axis_cells: f32,
     /// Largest chord, squared, of the optical axis from the middle of the region that a hint allows.
@@ -123,7 +123,7 @@ struct Level {
 #[derive(Debug, Default)]
 pub struct PoseGrids {
     near: [f32; 3],
-    levels: [Vec<Level>; GRIDS],
+    levels: [Vec<ScaleLevel>; GRIDS],
     first_level: [i32; GRIDS],
 }
 
@@ -146,7 +146,7 @@ impl PoseGrids {
                 let max_chord = near.map_or(f64::INFINITY, |near| {
                     chord_of(near.radius_rad + NEAR_SLACK * step_rad)
                 });
-                Level {
+                ScaleLevel {
                     axis_cells: (1.0 / step_rad) as f32,
                     max_chord_sq: (max_chord * max_chord) as f32,
                 }
@@ -155,7 +155,7 @@ impl PoseGrids {
     }
 
     /// The cells of the poses in which triangles are aligned.
-    pub fn cells(&self, alignments: &Alignments, cells: &mut Cells) {
+    pub fn cells(&self, alignments: &Alignments, cells: &mut PoseCells) {
         let mut poses = Poses::default();
         align(alignments, &mut poses);
         cells.allowed = [true; LANES];

@@ -7,7 +7,7 @@
 use super::plan::SearchPass;
 use crate::camera::frame_centre;
 use crate::identify::field::{Photometry, StarField};
-use crate::identify::index::{IndexedCatalog, Place, Triangle, TriangleShape, WantedShape};
+use crate::identify::index::{IndexedCatalog, Triangle, TriangleRange, TriangleShape, WantedShape};
 use nalgebra::Vector3;
 
 /// Centroid errors in a triangle's tolerance, in standard errors.
@@ -264,7 +264,7 @@ impl ObservedStars<'_> {
             let at = classes[query.class].places(&query.shape);
             places.extend(at.map(|place| (number, place)));
         }
-        let triangles = |&(number, ref place): &(u32, Place)| {
+        let triangles = |&(number, ref place): &(u32, TriangleRange)| {
             let query = &queries[number as usize];
             self.sky.triangles_at(query.class, place)
         };
@@ -341,7 +341,7 @@ impl ObservedStars<'_> {
 #[derive(Debug, Default)]
 pub struct LookedUp {
     /// Where triangles of the right shape are, each with the number of its query.
-    places: Vec<(u32, Place)>,
+    places: Vec<(u32, TriangleRange)>,
     /// The catalogue triangles that are like an observed one, in the order of the queries.
     pub similar: Vec<Similar>,
 }

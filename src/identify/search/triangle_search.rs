@@ -3,7 +3,7 @@
 //! Triangles of bright observed stars → similar catalogue triangles → hypotheses → confirmed by
 //! further stars.
 
-use super::aligned::{Aligned, InCamera};
+use super::aligned::{AlignedTriangle, InCamera};
 use super::confirmation::{ConfirmingStars, PendingHypothesis, Pose};
 use super::false_alarm::{FalseAlarm, TESTED_STARS};
 use super::plan::{PASSES, SearchPass, SearchPlan, WORK_OF_VOTE};
@@ -12,7 +12,7 @@ use super::queries::{LookedUp, ObservedStars, ObservedTriangle, Query, Similar};
 use super::tiers::Tiers;
 use super::unseen::Unseen;
 use super::votes::{Vote, Votes};
-use super::windows::Window;
+use super::windows::SearchWindow;
 use crate::base::coords::{Rotation, UnitVector};
 use crate::base::interrupt::Interrupt;
 use crate::camera::{CameraModel, DistortionModel, focal_length_px};
@@ -67,7 +67,7 @@ pub struct SearchBuffers {
 }
 
 /// The search over one field.
-pub struct Search<'a> {
+pub struct TriangleSearch<'a> {
     problem: Problem<'a>,
     plan: SearchPlan,
     effort: Effort,
@@ -84,12 +84,12 @@ pub struct Search<'a> {
     interrupted: bool,
     best_log10: Option<f64>,
     /// The best hypothesis that passes the limit but does not end the search.
-    provisional: Option<Found>,
+    provisional: Option<FoundHypothesis>,
 }
 
 /// A hypothesis that passed.
 #[derive(Debug, Clone, Copy)]
-pub struct Found {
+pub struct FoundHypothesis {
     /// The hypothesis, fitted.
     pub refined: Refined,
     /// log10 of its false-alarm probability.
@@ -102,7 +102,7 @@ pub struct Found {
     radius_px: f64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> TriangleSearch<'a> {
     /// A search over `field`.
     pub fn new(
         problem: Problem<'a>,
@@ -154,11 +154,11 @@ impl<'a> Search<'a> {
     /// then on. `None` where the stars of the frame do not confirm it.
     pub fn follow(
         mut self,
-        window: &Window,
-        found: &Found,
+        window: &SearchWindow,
+        found: &FoundHypothesis,
         whole: Problem<'a>,
         priors: &Priors,
-    ) -> (Self, Option<Found>) {
+    ) -> (Self, Option<FoundHypothesis>) {
         let grown = self.grown(window, found, whole);
         let (plan, hypotheses) = (self.plan, self.hypotheses);
         let mut search = self.again(whole, plan, priors);
@@ -168,7 +168,12 @@ impl<'a> Search<'a> {
     }
 
     /// The lens of what was found in a window, as far as the stars of the `whole` frame show it.
-    fn grown(&mut self, window: &Window, found: &Found, whole: Problem) -> Option<Hypothesis> {
+    fn grown(
+        &mut self,
+        window: &SearchWindow,
+        found: &FoundHypothesis,
+        whole: Problem,
+    ) -> Option<Hypothesis> {
         let refined = self.refined(&found.first, found.radius_px, TESTED_STARS)?;
         let SearchBuffers {
             refiner,
@@ -238,7 +243,7 @@ impl<'a> Search<'a> {
 
     /// A hypothesis that was not found by a triangle, fitted to the stars of the field; `None` where
     /// these do not confirm it. Of what is brightest, most may be leaves and lamps.
-    fn adopt(&mut self, hypothesis: &Hypothesis) -> Option<Found> {
+    fn adopt(&mut self, hypothesis: &Hypothesis) -> Option<FoundHypothesis> {
         const STARS: [usize; 3] = [TESTED_STARS, 4 * TESTED_STARS, 16 * TESTED_STARS];
         let all = self.problem.field.stars.len();
         let counts = STARS.into_iter().enumerate();
@@ -246,7 +251,7 @@ impl<'a> Search<'a> {
         counts.find_map(|(number, stars)| {
             let found = self.adopt_with(hypothesis, stars)?;
             let log10_false_alarm = found.log10_false_alarm + libm::log10(number as f64 + 1.0);
-            (log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+            (log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT).then_some(FoundHypothesis {
                 log10_false_alarm,
                 ..found
             })
@@ -254,7 +259,7 @@ impl<'a> Search<'a> {
     }
 
     /// [`Self::adopt`] with so many stars.
-    fn adopt_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<Found> {
+    fn adopt_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<FoundHypothesis> {
         /// Largest distance of true pairs, in diagonals of the frame.
         const RADIUS_SHARE: f64 = 0.002;
         let radius_px = RADIUS_SHARE * self.observed.diagonal_px;
@@ -268,7 +273,7 @@ impl<'a> Search<'a> {
         let refined = self.buffers.refiner.refine(self.problem, &start)?;
         let log10 = self.log10_of_agreement(self.problem.field, &refined.hypothesis())?;
         self.best_log10 = Some(log10);
-        (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(Found {
+        (log10 <= LOG10_FALSE_ALARM_LIMIT).then_some(FoundHypothesis {
             log10_false_alarm: log10,
             refined,
             stars,
@@ -298,7 +303,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tries triangles until a hypothesis passes. Returns it, fitted to the brightest stars.
-    pub fn run(&mut self) -> Option<Found> {
+    pub fn run(&mut self) -> Option<FoundHypothesis> {
         let plan = self.plan;
         plan.passes
             .iter()
@@ -308,7 +313,7 @@ impl<'a> Search<'a> {
 
     /// Lets the triangles of more and more stars vote, and tests the poses with most votes. Every vote
     /// counts as a hypothesis.
-    fn vote(&mut self) -> Option<Found> {
+    fn vote(&mut self) -> Option<FoundHypothesis> {
         let tested = self.hypotheses;
         self.candidates = 0;
         self.buffers.queries.clear();
@@ -370,7 +375,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tests the poses with most votes.
-    fn try_leading(&mut self) -> Option<Found> {
+    fn try_leading(&mut self) -> Option<FoundHypothesis> {
         let mut number = 0;
         while let Some(vote) = self.buffers.votes.leading(number)
             && !self.is_interrupted()
@@ -383,7 +388,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    fn try_vote(&mut self, vote: &Vote) -> Option<Found> {
+    fn try_vote(&mut self, vote: &Vote) -> Option<FoundHypothesis> {
         let query = self.buffers.queries[vote.query()];
         let pending = self.pending(&query, &vote.similar)?;
         self.decide_pending(&pending, &query.triangle)
@@ -394,7 +399,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tries the triangles of one pass in the order of their faintest star, then of the second.
-    fn sweep(&mut self, pass: &SearchPass) -> Option<Found> {
+    fn sweep(&mut self, pass: &SearchPass) -> Option<FoundHypothesis> {
         triangles(2, self.stars_of(pass)).find_map(|stars| {
             if self.is_exhausted() || self.is_interrupted() {
                 return None;
@@ -415,7 +420,7 @@ impl<'a> Search<'a> {
         self.hypotheses > self.plan.max_tested || self.candidates > self.plan.max_work
     }
 
-    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<Found> {
+    fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<FoundHypothesis> {
         let mut queries = std::mem::take(&mut self.buffers.queries);
         let mut looked_up = std::mem::take(&mut self.buffers.looked_up);
         queries.clear();
@@ -430,7 +435,7 @@ impl<'a> Search<'a> {
     }
 
     /// Tests one hypothesis: the three observed stars are these three of the catalogue.
-    fn try_similar(&mut self, query: &Query, similar: &Similar) -> Option<Found> {
+    fn try_similar(&mut self, query: &Query, similar: &Similar) -> Option<FoundHypothesis> {
         if self.is_exhausted() {
             return None;
         }
@@ -467,7 +472,7 @@ impl<'a> Search<'a> {
             }
         }
         let in_camera = InCamera::new(&self.observed.vectors(&query.triangle, focal_px))?;
-        let Aligned {
+        let AlignedTriangle {
             mirrored,
             of_camera,
             of_sky,
@@ -492,7 +497,7 @@ impl<'a> Search<'a> {
         &mut self,
         pending: &PendingHypothesis,
         triangle: &ObservedTriangle,
-    ) -> Option<Found> {
+    ) -> Option<FoundHypothesis> {
         let (width_px, height_px) = (self.problem.field.width_px, self.problem.field.height_px);
         let Pose {
             sky_to_camera,
@@ -513,7 +518,11 @@ impl<'a> Search<'a> {
     /// it if it ends the search.
     ///
     /// The brightest stars are asked first: mostly they alone are enough.
-    fn decide(&mut self, hypothesis: &Hypothesis, triangle: &ObservedTriangle) -> Option<Found> {
+    fn decide(
+        &mut self,
+        hypothesis: &Hypothesis,
+        triangle: &ObservedTriangle,
+    ) -> Option<FoundHypothesis> {
         if let Some(found) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
             && found.log10_false_alarm <= LOG10_SURE
         {
@@ -540,10 +549,10 @@ impl<'a> Search<'a> {
         hypothesis: &Hypothesis,
         triangle: &ObservedTriangle,
         stars: usize,
-    ) -> Option<Found> {
+    ) -> Option<FoundHypothesis> {
         let radius_px = triangle.confirming_px;
         let refined = self.refined(hypothesis, radius_px, stars)?;
-        Some(Found {
+        Some(FoundHypothesis {
             log10_false_alarm: self.log10_with(&refined.hypothesis(), stars)?,
             refined,
             stars,
@@ -569,7 +578,7 @@ impl<'a> Search<'a> {
     }
 
     /// What was found, fitted to all [`TESTED_STARS`], for the fit to all stars to start from.
-    pub fn with_more_stars(&mut self, found: &Found) -> Refined {
+    pub fn with_more_stars(&mut self, found: &FoundHypothesis) -> Refined {
         let more = (found.stars < TESTED_STARS)
             .then(|| self.refined(&found.first, found.radius_px, TESTED_STARS));
         more.flatten().unwrap_or(found.refined)

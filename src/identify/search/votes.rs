@@ -9,7 +9,7 @@
 //! # Reference
 //! Ballard 1981, Pattern Recognition 13, 111: the generalized Hough transform.
 
-use super::pose_cells::{Alignments, CameraAxes, Cells, GRIDS, LANES, PoseGrids};
+use super::pose_cells::{Alignments, CameraAxes, GRIDS, LANES, PoseCells, PoseGrids};
 use super::queries::Similar;
 use crate::identify::index::PackedVectors;
 use crate::identify::priors::SkyRegion;
@@ -42,7 +42,7 @@ impl Vote {
 
 /// A cell's number and a vote for it.
 #[derive(Debug, Clone, Copy, Default)]
-struct Entry {
+struct CellVote {
     cell: u32,
     vote: u32,
 }
@@ -63,11 +63,11 @@ struct Leader {
 pub struct Votes {
     grids: PoseGrids,
     alignments: Alignments,
-    cells: Cells,
+    cells: PoseCells,
     votes: Vec<Vote>,
     /// Of each grid, sorted by cell, then in the order of the votes.
-    entries: [Vec<Entry>; GRIDS],
-    spare: Vec<Entry>,
+    entries: [Vec<CellVote>; GRIDS],
+    spare: Vec<CellVote>,
     leaders: Vec<Leader>,
 }
 
@@ -130,7 +130,7 @@ impl Votes {
             let mut entries = std::mem::take(&mut self.entries[grid]);
             entries.clear();
             let votes = self.votes.iter().zip(0..);
-            entries.extend(votes.map(|(vote, number)| Entry {
+            entries.extend(votes.map(|(vote, number)| CellVote {
                 cell: vote.cells[grid],
                 vote: number,
             }));
@@ -149,12 +149,12 @@ impl Votes {
         self.leaders.truncate(MAX_LEADERS);
     }
 
-    fn add_leaders(&mut self, grid: usize, entries: &[Entry]) {
+    fn add_leaders(&mut self, grid: usize, entries: &[CellVote]) {
         let mut first = 0;
         for cell in entries.chunk_by(|a, b| a.cell == b.cell) {
             let count = cell.len();
             if count >= MIN_TRIANGLES as usize {
-                let triangle = |entry: &Entry| self.votes[entry.vote as usize].triangle;
+                let triangle = |entry: &CellVote| self.votes[entry.vote as usize].triangle;
                 let others = cell
                     .windows(2)
                     .filter(|pair| triangle(&pair[0]) != triangle(&pair[1]));
@@ -183,11 +183,11 @@ impl Votes {
 }
 
 /// Sorts by cell and keeps the order within a cell: a radix sort.
-fn sort_by_cell(entries: &mut Vec<Entry>, spare: &mut Vec<Entry>) {
+fn sort_by_cell(entries: &mut Vec<CellVote>, spare: &mut Vec<CellVote>) {
     spare.clear();
-    spare.resize(entries.len(), Entry::default());
+    spare.resize(entries.len(), CellVote::default());
     for shift in (0..u32::BITS).step_by(DIGIT_BITS as usize) {
-        let digit = |entry: &Entry| (entry.cell >> shift) as usize % DIGITS;
+        let digit = |entry: &CellVote| (entry.cell >> shift) as usize % DIGITS;
         let mut starts = [0_u32; DIGITS];
         for entry in entries.iter() {
             starts[digit(entry)] += 1;
@@ -228,7 +228,7 @@ mod tests {
         let mut alignments = Alignments::default();
         let sky = sky.map(|v| [v.x, v.y, v.z].map(|x| x as f32));
         alignments.set(0, sky, &axes, focal_px.ln() as f32);
-        let mut cells = Cells::default();
+        let mut cells = PoseCells::default();
         votes.grids.cells(&alignments, &mut cells);
         cells.allowed[0].then(|| cells.cells.map(|cells| cells[0]))
     }
@@ -299,12 +299,12 @@ mod tests {
         fn entries_are_sorted_as_a_stable_sort_does(
             cells in prop::collection::vec(prop_oneof![0..20_u32, any::<u32>()], 0..300),
         ) {
-            let entries = cells.into_iter().zip(0..).map(|(cell, vote)| Entry { cell, vote });
-            let mut sorted: Vec<Entry> = entries.collect();
+            let entries = cells.into_iter().zip(0..).map(|(cell, vote)| CellVote { cell, vote });
+            let mut sorted: Vec<CellVote> = entries.collect();
             let mut expected = sorted.clone();
             expected.sort_by_key(|entry| entry.cell);
             sort_by_cell(&mut sorted, &mut Vec::new());
-            let plain = |entries: &[Entry]| -> Vec<_> {
+            let plain = |entries: &[CellVote]| -> Vec<_> {
                 entries.iter().map(|entry| (entry.cell, entry.vote)).collect()
             };
             prop_assert_eq!(plain(&sorted), plain(&expected));

@@ -30,7 +30,7 @@ const MIN_STARS_OF_SMALLEST: usize = 25;
 
 /// A window.
 #[derive(Debug, Clone)]
-pub struct Window {
+pub struct SearchWindow {
     /// Its stars, in its own pixels.
     pub field: StarField,
     /// Its first pixel in the frame.
@@ -41,7 +41,7 @@ pub struct Window {
     pub is_main: bool,
 }
 
-impl Window {
+impl SearchWindow {
     /// Its centre, in the frame.
     pub fn centre(&self) -> PixelPoint {
         let StarField {
@@ -71,11 +71,11 @@ impl Window {
 
 /// Cuts windows. Their buffers are reused.
 #[derive(Debug, Default)]
-pub struct Windows(Vec<Window>);
+pub struct Windows(Vec<SearchWindow>);
 
 impl Windows {
     /// The windows of `field` that have stars enough.
-    pub fn of(&mut self, field: &StarField) -> &[Window] {
+    pub fn of(&mut self, field: &StarField) -> &[SearchWindow] {
         let shorter_px = field.width_px.min(field.height_px);
         let mut count = 0;
         for ([x, y], side) in WINDOWS {
@@ -98,7 +98,7 @@ impl Windows {
                 MIN_STARS
             };
             let is_worth_it = stars.len() >= least;
-            let window = Window {
+            let window = SearchWindow {
                 field: StarField {
                     width_px: side_px,
                     height_px: side_px,

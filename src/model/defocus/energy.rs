@@ -57,7 +57,7 @@ pub enum MeasureError {
 
 /// Other consequences of the spot's size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Reach {
+pub struct SpotLimits {
     /// Cramér-Rao bound of the RMS distance, averaged over positions in a pixel, in pixels;
     /// saturation is ignored.
     pub bound_px: f64,
@@ -187,14 +187,14 @@ impl EnergyStudy {
     }
 
     /// Bound, limit and peak charge for such a spot at this read noise.
-    pub fn reach(&self, spot_px: f64, noise_e: f64) -> Reach {
+    pub fn reach(&self, spot_px: f64, noise_e: f64) -> SpotLimits {
         let scenario = self.scenario_of(spot_px, noise_e);
         let budget = Budget::new(&scenario);
         let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
         let limit_vmag = detector.vmag_at(0.5);
         let star_e = budget.electrons_of(self.v_mag, scenario.conditions.exposure_s);
         let peak_e = star_e * budget.peak_share + budget.background_e + budget.dark_e;
-        Reach {
+        SpotLimits {
             bound_px: bound_px(spot_px, star_e, budget.background_noise_e.powi(2)),
             limit_vmag: limit_vmag.is_finite().then_some(limit_vmag),
             peak_part: peak_e / scenario.camera.full_well_e,

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// Radii and noises at which errors are measured.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
+pub struct SpotNoiseGrid {
     /// Standard deviations of the spot, increasing, in pixels.
     #[doc(alias = "sigma_s")]
     pub spots_px: Vec<f64>,
@@ -18,7 +18,7 @@ pub struct Grid {
     pub noises: Vec<f64>,
 }
 
-impl Grid {
+impl SpotNoiseGrid {
     /// Radii and noises of the paper, as parts of full scale.
     pub fn of_paper() -> Self {
         Self {
@@ -84,7 +84,7 @@ impl ErrorPoint {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorGrid {
     /// Radii and noises.
-    pub grid: Grid,
+    pub grid: SpotNoiseGrid,
     /// Row-major: all noises of the first radius, then of the next.
     pub points: Vec<ErrorPoint>,
 }
@@ -97,7 +97,7 @@ impl ErrorGrid {
     /// # Errors
     /// The first error of `measure`.
     pub fn measure<E: Send>(
-        grid: Grid,
+        grid: SpotNoiseGrid,
         seed: u64,
         measure: impl Fn(f64, f64, &mut ChaCha8Rng) -> Result<ErrorPoint, E> + Sync,
         done: impl Fn() + Sync,
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn points_lie_where_the_grid_has_them() {
-        let grid = Grid {
+        let grid = SpotNoiseGrid {
             spots_px: vec![1.0, 2.0],
             noises: vec![10.0, 20.0, 30.0],
         };

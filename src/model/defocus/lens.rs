@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// A lens and its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Lens {
+pub struct DefocusLens {
     /// Focal length over aperture.
     pub f_number: f64,
     /// Pixel pitch, in µm: the geometric mean of both.
@@ -16,7 +16,7 @@ pub struct Lens {
     pub focused_px: f64,
 }
 
-impl Lens {
+impl DefocusLens {
     /// The lens of a camera with this standard deviation of the spot in focus, in pixels.
     pub fn of(sheet: &DataSheet, focused_px: f64) -> Self {
         Self {
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_disc_has_the_standard_deviation_of_the_spot_asked_for() {
-        let lens = Lens {
+        let lens = DefocusLens {
             f_number: 1.5,
             pitch_um: 5.0,
             wavelength_nm: 600.0,
@@ -71,7 +71,7 @@ mod tests {
         };
         // 60 µm at f/1.5: a disc of 40 µm across, radius 20 µm, standard deviation 10 µm: 2 px.
         assert_eq!(lens.distance_um(2.0), Some(60.0));
-        let blurred = Lens {
+        let blurred = DefocusLens {
             focused_px: 1.2,
             ..lens
         };

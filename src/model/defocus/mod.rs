@@ -33,11 +33,11 @@ mod peak;
 mod surface;
 
 pub use curve::{ErrorCurve, Optimum};
-pub use energy::{Centroiding, EnergyStudy, MeasureError, Reach};
-pub use grid::{ErrorGrid, ErrorPoint, Grid};
+pub use energy::{Centroiding, EnergyStudy, MeasureError, SpotLimits};
+pub use grid::{ErrorGrid, ErrorPoint, SpotNoiseGrid};
 pub use isoline::{IsoLine, IsoPoint, Parabola};
-pub use lens::Lens;
-pub use peak::{Expected, PeakStudy, SpotInWindow, sampling_bias_px};
+pub use lens::DefocusLens;
+pub use peak::{ExpectedError, PeakStudy, SpotInWindow, sampling_bias_px};
 pub use surface::{Surface, SurfaceError};
 
 /// Relative noise of the paper's twenty dark frames: fraction of full scale (eq. 4).

@@ -38,7 +38,7 @@ impl Default for PeakStudy {
 
 /// Expected error in closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Expected {
+pub struct ExpectedError {
     /// RMS distance, in pixels.
     pub rms_px: f64,
     /// Its part without noise: bias by sampling and by the edge of the window, in pixels.
@@ -121,7 +121,7 @@ impl PeakStudy {
     }
 
     /// The error in closed form, see [`SpotInWindow::expected`].
-    pub fn expected(&self, spot_px: f64, noise: f64) -> Expected {
+    pub fn expected(&self, spot_px: f64, noise: f64) -> ExpectedError {
         self.spot(spot_px).expected(noise)
     }
 
@@ -216,7 +216,7 @@ impl SpotInWindow {
     /// With a window of n² pixels, light G in it, its mean position x̄, noise σ, and `a = Σ (i −
     /// x̄) ν / G`, `e = Σ ν / G` of the noise ν: `x − x₀ = x̄ − x₀ + a / (1 + e)`, expanded in the
     /// variances of a and e and their covariance.
-    pub fn expected(&self, noise: f64) -> Expected {
+    pub fn expected(&self, noise: f64) -> ExpectedError {
         let half = self.half_window_px as f64;
         let n = 2.0 * half + 1.0;
         // Σ i² over the window's columns.
@@ -238,7 +238,7 @@ impl SpotInWindow {
         }
         // Both axes contribute the same.
         let root = |sum: f64| (2.0 * sum / (PLACES * PLACES) as f64).sqrt();
-        Expected {
+        ExpectedError {
             rms_px: root(of_all),
             bias_px: root(of_bias),
         }

@@ -198,11 +198,11 @@ impl ScaledAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::defocus::{ErrorPoint, Grid};
+    use crate::model::defocus::{ErrorPoint, SpotNoiseGrid};
     use crate::model::sensitivity::Spacing;
 
     fn papers_grid(of: impl Fn(f64, f64) -> f64) -> ErrorGrid {
-        let grid = Grid {
+        let grid = SpotNoiseGrid {
             spots_px: Spacing::Linear.values(0.4, 2.4, 200),
             noises: Spacing::Linear.values(2e-4, 20e-4, 100),
         };

@@ -9,14 +9,14 @@
 
 use super::check::ScenarioError;
 use super::scenario::Scenario;
-use super::sweep::{Curve, Series, Spacing, Sweep, SweepError, curves};
+use super::sweep::{CurveValues, Spacing, Sweep, SweepCurve, SweepError, curves};
 
 /// Number of values along a figure's axis.
 const VALUES: usize = 96;
 
 /// A figure of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figure {
+pub struct PaperFigure {
     /// Number and letter in the paper: `3a`.
     pub id: &'static str,
     /// Title.
@@ -28,10 +28,10 @@ pub struct Figure {
     /// Spacing of the values.
     pub spacing: Spacing,
     /// The parameter that differs between the curves.
-    pub series: Series,
+    pub series: CurveValues,
 }
 
-impl Figure {
+impl PaperFigure {
     /// All eleven figures.
     pub const ALL: [Self; 11] = [
         Self::over("3a", "Lens transmission", "lens_transmission", [0.1, 1.0]),
@@ -52,7 +52,7 @@ impl Figure {
         ),
         Self::over("3g", "Dark current", "dark_current_e_s", [0.0, 1e5]),
         Self {
-            series: Series::PAPER_APERTURES,
+            series: CurveValues::PAPER_APERTURES,
             ..Self::over("3h", "Exposure", "exposure_s", [0.005, 1.0])
         },
         Self::over(
@@ -85,7 +85,7 @@ impl Figure {
             parameter,
             range,
             spacing: Spacing::Linear,
-            series: Series::PAPER_EXPOSURES,
+            series: CurveValues::PAPER_EXPOSURES,
         }
     }
 
@@ -112,7 +112,7 @@ impl Figure {
     ///
     /// # Errors
     /// [`ScenarioError`] if a value has no limit.
-    pub fn curves(&self, base: &Scenario, sweep: &Sweep) -> Result<Vec<Curve>, ScenarioError> {
+    pub fn curves(&self, base: &Scenario, sweep: &Sweep) -> Result<Vec<SweepCurve>, ScenarioError> {
         curves(base, sweep, &self.series)
     }
 }

@@ -2,49 +2,49 @@
 
 use super::conditions::{Conditions, Extinction, REFERENCE_NM, SkyBrightness};
 use super::scenario::Scenario;
-use crate::camera::data_sheet::{DataSheet, KEYS, Key, Limits, key, nearest_name};
+use crate::camera::data_sheet::{DataSheet, KEYS, Key, NumberRange, key, nearest_name};
 
 /// The numbers in [`Conditions`]. Of several that state the same quantity in different units, the
 /// last one given counts.
 pub const CONDITION_KEYS: &[Key<Conditions>] = &[
-    key!(exposure_s, Limits::Positive, "exposure, in seconds"),
+    key!(exposure_s, NumberRange::Positive, "exposure, in seconds"),
     key!(
         zenith_distance_deg,
-        Limits::FromToBelow(0.0, 90.0),
+        NumberRange::FromToBelow(0.0, 90.0),
         "zenith distance, in degrees"
     ),
     Key {
         name: "sky_mag_arcsec2",
         about: "brightness of the sky, in V magnitudes in a square arcsecond",
-        limits: Limits::Finite,
+        limits: NumberRange::Finite,
         get: |conditions| Some(conditions.sky.mag_arcsec2()),
         set: |conditions, mag| conditions.sky = SkyBrightness::MagArcsec2(mag),
     },
     Key {
         name: "sky_luminance_cd_m2",
         about: "the same as a luminance, in cd/m²",
-        limits: Limits::Positive,
+        limits: NumberRange::Positive,
         get: |conditions| Some(conditions.sky.luminance_cd_m2()),
         set: |conditions, luminance| conditions.sky = SkyBrightness::LuminanceCdM2(luminance),
     },
     Key {
         name: "sky_illuminance_lx",
         about: "the same as the illuminance of level ground, in lx",
-        limits: Limits::Positive,
+        limits: NumberRange::Positive,
         get: |conditions| Some(conditions.sky.illuminance_lx()),
         set: |conditions, illuminance| conditions.sky = SkyBrightness::IlluminanceLx(illuminance),
     },
     Key {
         name: "zenith_transmission",
         about: "part of the light of 555 nm that comes through one airmass, by the law of eq. (3)",
-        limits: Limits::Share,
+        limits: NumberRange::Share,
         get: |conditions| Some(conditions.extinction.zenith_transmission(REFERENCE_NM)),
         set: |conditions, part| conditions.extinction = Extinction::law_through(part),
     },
     Key {
         name: "extinction_mag_per_airmass",
         about: "extinction, in magnitudes for each airmass, the same at every wavelength",
-        limits: Limits::NotNegative,
+        limits: NumberRange::NotNegative,
         get: |conditions| match conditions.extinction {
             Extinction::MagPerAirmass(mag) => Some(mag),
             Extinction::Law(_) => None,
@@ -53,22 +53,22 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     },
     key!(
         star_temperature_k,
-        Limits::Positive,
+        NumberRange::Positive,
         "color temperature of the star, in kelvin (physical reading)"
     ),
     key!(
         motion_px,
-        Limits::FromToBelow(0.0, 100.0),
+        NumberRange::FromToBelow(0.0, 100.0),
         "how far a star moves during the exposure, in pixels"
     ),
     key!(
         snr,
-        Limits::Positive,
+        NumberRange::Positive,
         "signal over noise in the brightest pixel that counts as a detection"
     ),
     key!(
         false_alarms_per_mpx,
-        Limits::Positive,
+        NumberRange::Positive,
         "false detections in a million pixels that the detector accepts"
     ),
 ];
@@ -77,7 +77,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
 const PIXEL_AREA: Key<DataSheet> = Key {
     name: "pixel_area_um2",
     about: "area of a pixel, in µm²; its form and the spot's size in µm stay",
-    limits: Limits::Positive,
+    limits: NumberRange::Positive,
     get: |sheet| Some(sheet.pitch_x_um * sheet.pitch_y_um),
     set: |sheet, area_um2| {
         let factor = area_um2 / (sheet.pitch_x_um * sheet.pitch_y_um);
@@ -224,7 +224,7 @@ impl Parameter {
     }
 
     /// Valid values.
-    pub fn limits(self) -> Limits {
+    pub fn limits(self) -> NumberRange {
         match self {
             Self::Camera(key) => key.limits,
             Self::Conditions(key) => key.limits,

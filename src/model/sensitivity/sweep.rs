@@ -4,7 +4,7 @@ use super::budget::Budget;
 use super::check::ScenarioError;
 use super::parameters::{Parameter, UnknownParameter};
 use super::scenario::Scenario;
-use crate::camera::data_sheet::Limits;
+use crate::camera::data_sheet::NumberRange;
 use std::cmp::Ordering;
 
 /// Spacing of values.
@@ -105,7 +105,7 @@ pub enum SweepError {
         /// The value.
         found: f64,
         /// Valid values.
-        expected: Limits,
+        expected: NumberRange,
     },
     /// Logarithmic spacing needs values above 0.
     #[error("logarithmic steps from {from}, expected a start above 0")]
@@ -164,14 +164,14 @@ impl Sweep {
 
 /// The parameter that differs between the curves of a figure, and its values.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Series {
+pub struct CurveValues {
     /// Name of the parameter.
     pub parameter: &'static str,
     /// Its value for each curve.
     pub values: [f64; 2],
 }
 
-impl Series {
+impl CurveValues {
     /// The two exposures of the paper's figures.
     pub const PAPER_EXPOSURES: Self = Self {
         parameter: "exposure_s",
@@ -203,7 +203,7 @@ impl Series {
 
 /// A curve of a figure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct SweepCurve {
     /// Label: `exposure 0.04 s`.
     pub label: String,
     /// Values of the parameter and limiting magnitudes.
@@ -217,8 +217,8 @@ pub struct Curve {
 pub fn curves(
     base: &Scenario,
     sweep: &Sweep,
-    series: &Series,
-) -> Result<Vec<Curve>, ScenarioError> {
+    series: &CurveValues,
+) -> Result<Vec<SweepCurve>, ScenarioError> {
     let Ok(apart) = Parameter::named(series.parameter) else {
         return Ok(Vec::new());
     };
@@ -228,7 +228,7 @@ pub fn curves(
         let limit = |scenario: &Scenario| Ok(Budget::checked(scenario)?.limit_vmag);
         let scenarios = sweep.scenarios(&base)?;
         let limits: Result<Vec<f64>, ScenarioError> = scenarios.iter().map(limit).collect();
-        Ok(Curve {
+        Ok(SweepCurve {
             label: format!("{} {value} {}", apart.quantity(), apart.unit()),
             points: sweep.values.iter().copied().zip(limits?).collect(),
         })
@@ -313,13 +313,13 @@ mod tests {
     fn a_curve_is_the_limit_at_each_value() {
         let base = Scenario::of(Preset::Experiment1);
         let swept = sweep("focal_length_mm", 80.0, 160.0, 3).unwrap();
-        let found = curves(&base, &swept, &Series::around(&base, swept.parameter)).unwrap();
+        let found = curves(&base, &swept, &CurveValues::around(&base, swept.parameter)).unwrap();
         assert_eq!(found[0].label, "exposure 0.04 s");
         assert_eq!(found[1].label, "exposure 0.5 s");
         assert_eq!(found[0].points[2], (160.0, Budget::new(&base).limit_vmag));
         assert!(found[1].points[2].1 > 10.7);
         let exposure = Parameter::named("exposure_s").unwrap();
-        let series = Series::around(&base, exposure);
+        let series = CurveValues::around(&base, exposure);
         assert_eq!(
             (series.parameter, series.values),
             ("aperture_mm", [100.0, 50.0])

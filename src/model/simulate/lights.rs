@@ -23,13 +23,13 @@ const LAMP_RADIUS_RAD: f64 = 0.002;
 
 /// A bright light in the frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Light {
+pub(super) struct BrightLight {
     place: PixelPoint,
     radius_px: f64,
     electrons: f64,
 }
 
-impl Light {
+impl BrightLight {
     /// Adds it to an image.
     pub(super) fn draw(&self, image: &mut ElectronImage) {
         let radius_px = self.radius_px.max(1.0);
@@ -81,10 +81,10 @@ pub(super) fn lights(
     camera: &CameraModel,
     light: &StarLight,
     mut random: ChaCha8Rng,
-) -> Vec<Light> {
+) -> Vec<BrightLight> {
     let of = |direction: UnitVector<Camera>, radius_rad: f64, v_mag: f64| {
         let place = camera.pixel_of(&direction)?;
-        camera.contains(&place).then_some(Light {
+        camera.contains(&place).then_some(BrightLight {
             place,
             radius_px: radius_rad * camera.focal_length_px(),
             electrons: light.electrons(v_mag, None),
@@ -102,7 +102,7 @@ pub(super) fn lights(
         let at = along * (cos * first + sin * second) + up * zenith.as_vector();
         of(UnitVector::from_unit(at), LAMP_RADIUS_RAD, scene.lamp_vmag)
     };
-    let lamps: Vec<Light> = (0..count).filter_map(lamp).collect();
+    let lamps: Vec<BrightLight> = (0..count).filter_map(lamp).collect();
     moon.into_iter().chain(lamps).collect()
 }
 
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn a_light_has_its_electrons_in_disc_and_halo() {
         let mut image = ElectronImage::new(401, 401, 0.0);
-        let light = Light {
+        let light = BrightLight {
             place: PixelPoint::new(200.0, 200.0),
             radius_px: 5.0,
             electrons: 1e6,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 /// The motion of stars during one exposure.
 #[derive(Debug, Clone)]
-pub(super) struct Motion<'a> {
+pub(super) struct StarMotion<'a> {
     camera: &'a CameraModel,
     /// Rotation axis in camera axes, and rotation angle during the exposure, in radians.
     axis: Vector3<f64>,
@@ -15,7 +15,7 @@ pub(super) struct Motion<'a> {
     along_x_px: f64,
 }
 
-impl<'a> Motion<'a> {
+impl<'a> StarMotion<'a> {
     pub(super) fn new(camera: &'a CameraModel, turn_rad: Vector3<f64>, along_x_px: f64) -> Self {
         Self {
             camera,
@@ -122,7 +122,7 @@ mod tests {
     }
 
     /// Sum of the fractions, mean position, and points.
-    fn summed(motion: &Motion, middle: PixelPoint) -> (f64, PixelPoint, Vec<PixelPoint>) {
+    fn summed(motion: &StarMotion, middle: PixelPoint) -> (f64, PixelPoint, Vec<PixelPoint>) {
         let (mut sum, mut mean, mut points) = (0.0, PixelPoint::default(), Vec::new());
         motion.along(&middle, 1.0, |point, part| {
             sum += part;
@@ -137,7 +137,7 @@ mod tests {
         let camera = camera();
         // 0.01 rad at a focal length of 1000 px; x to the right, the camera turns to it, stars go
         // left.
-        let motion = Motion::new(&camera, Vector3::new(0.0, 0.01, 0.0), 0.0);
+        let motion = StarMotion::new(&camera, Vector3::new(0.0, 0.01, 0.0), 0.0);
         let end = motion.at(&camera.centre(), 0.5).unwrap();
         assert!((end.x - (camera.centre().x - 5.0)).abs() < 1e-3 && (end.y - 49.5).abs() < 1e-9);
         assert!((motion.length_px(&camera.centre()) - 10.0).abs() < 1e-3);
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn a_camera_that_rolls_leaves_its_centre_and_turns_the_rest() {
         let camera = camera();
-        let motion = Motion::new(&camera, Vector3::new(0.0, 0.0, 0.1), 0.0);
+        let motion = StarMotion::new(&camera, Vector3::new(0.0, 0.0, 0.1), 0.0);
         let (_, _, points) = summed(&motion, camera.centre());
         assert_eq!(points, [camera.centre()]);
         let edge = PixelPoint::new(camera.centre().x + 90.0, camera.centre().y);
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn what_is_put_down_is_the_mean_along_the_way() {
         let camera = camera();
-        let motion = Motion::new(&camera, Vector3::zeros(), 3.0);
+        let motion = StarMotion::new(&camera, Vector3::zeros(), 3.0);
         let gaussian = |x: f64| (-0.5 * x * x).exp();
         let middle = PixelPoint::new(20.0, 20.0);
         for offset in [0.0, 0.4, 1.7, -2.6] {

@@ -1,6 +1,6 @@
 //! What happens during the exposure: motion of the camera, and everything in the sky besides stars.
 
-use crate::camera::data_sheet::{Key, Limits, key};
+use crate::camera::data_sheet::{Key, NumberRange, key};
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -181,11 +181,11 @@ macro_rules! optional_key {
 }
 
 /// Valid angular rates, in degrees per second.
-const RATES_DEG_S: Limits = Limits::FromTo(-360.0, 360.0);
+const RATES_DEG_S: NumberRange = NumberRange::FromTo(-360.0, 360.0);
 /// Valid directions, in degrees.
-const ANGLES_DEG: Limits = Limits::FromTo(-360.0, 360.0);
+const ANGLES_DEG: NumberRange = NumberRange::FromTo(-360.0, 360.0);
 /// Valid magnitudes: from the Sun to beyond any telescope.
-const MAGNITUDES: Limits = Limits::FromTo(-27.0, 40.0);
+const MAGNITUDES: NumberRange = NumberRange::FromTo(-27.0, 40.0);
 
 /// The numbers in [`Scene`] by name. All are optional.
 pub const SCENE_KEYS: &[Key<Scene>] = &[
@@ -211,17 +211,17 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     key!(
         swing_deg,
-        Limits::FromTo(0.0, 180.0),
+        NumberRange::FromTo(0.0, 180.0),
         "rolling ship: amplitude of the swing about the y axis, in degrees"
     ),
     key!(
         swing_period_s,
-        Limits::Positive,
+        NumberRange::Positive,
         "period of that swing, in seconds"
     ),
     key!(
         sky_gradient,
-        Limits::FromTo(0.0, 1.0),
+        NumberRange::FromTo(0.0, 1.0),
         "how much brighter the sky is at one border than in the centre, as a part"
     ),
     key!(
@@ -231,7 +231,7 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     optional_key!(
         moon_distance_deg,
-        Limits::FromTo(0.0, 180.0),
+        NumberRange::FromTo(0.0, 180.0),
         "angle between boresight and Moon, in degrees; no Moon without it"
     ),
     key!(
@@ -241,33 +241,37 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     key!(
         moon_phase_deg,
-        Limits::FromTo(0.0, 180.0),
+        NumberRange::FromTo(0.0, 180.0),
         "phase angle of the Moon, in degrees: 0 full, 180 new"
     ),
     key!(
         moon_zenith_distance_deg,
-        Limits::FromToBelow(0.0, 90.0),
+        NumberRange::FromToBelow(0.0, 90.0),
         "zenith distance of the Moon, in degrees"
     ),
     key!(
         cloud_mag,
-        Limits::FromTo(0.0, 30.0),
+        NumberRange::FromTo(0.0, 30.0),
         "extinction where clouds are thickest, in magnitudes"
     ),
-    key!(cloud_size_px, Limits::Positive, "size of clouds, in pixels"),
+    key!(
+        cloud_size_px,
+        NumberRange::Positive,
+        "size of clouds, in pixels"
+    ),
     key!(
         cloud_light,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "light that the thickest cloud adds, relative to the clear sky"
     ),
     optional_key!(
         cloud_share,
-        Limits::FromTo(0.0, 1.0),
+        NumberRange::FromTo(0.0, 1.0),
         "part of the sky that clouds cover on average (else half)"
     ),
     optional_key!(
         cloud_bank_px,
-        Limits::FromTo(-1e6, 1e6),
+        NumberRange::FromTo(-1e6, 1e6),
         "one bank of clouds, whose front is so far from the centre, in pixels"
     ),
     optional_key!(
@@ -277,59 +281,59 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     optional_key!(
         cloud_bank_width_px,
-        Limits::Positive,
+        NumberRange::Positive,
         "width of the bank, in pixels (else without end)"
     ),
     optional_key!(
         skyline_deg,
-        Limits::FromTo(-90.0, 90.0),
+        NumberRange::FromTo(-90.0, 90.0),
         "altitude up to which trees and houses hide the sky, in degrees; none without it"
     ),
     key!(
         skyline_relief_deg,
-        Limits::FromTo(0.0, 90.0),
+        NumberRange::FromTo(0.0, 90.0),
         "standard deviation of that altitude along the horizon, in degrees"
     ),
     key!(
         skyline_light,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "brightness of trees and houses, relative to the clear sky"
     ),
     key!(
         lamps,
-        Limits::FromTo(0.0, 1000.0),
+        NumberRange::FromTo(0.0, 1000.0),
         "lamps at the horizon, on average"
     ),
     key!(lamp_vmag, MAGNITUDES, "V magnitude of a lamp"),
     key!(
         cosmic_rays_cm2_s,
-        Limits::FromTo(0.0, 1e6),
+        NumberRange::FromTo(0.0, 1e6),
         "cosmic rays on a square centimetre in a second"
     ),
     key!(
         cosmic_ray_e_um,
-        Limits::Positive,
+        NumberRange::Positive,
         "electrons that a cosmic ray leaves on a micrometre of its way"
     ),
     key!(
         trails,
-        Limits::FromTo(0.0, 1e4),
+        NumberRange::FromTo(0.0, 1e4),
         "trails of satellites on a frame, on average"
     ),
     key!(trail_vmag, MAGNITUDES, "V magnitude of such a satellite"),
     key!(
         trail_rate_deg_s,
-        Limits::Positive,
+        NumberRange::Positive,
         "how fast it moves, in degrees a second"
     ),
     key!(
         by_altitude,
-        Limits::FromTo(0.0, 1.0),
+        NumberRange::FromTo(0.0, 1.0),
         "1 for air and airglow that grow thicker towards the horizon, 0 for the same over the frame"
     ),
     key!(
         false_stars,
-        Limits::FromTo(0.0, 1e6),
+        NumberRange::FromTo(0.0, 1e6),
         "false stars on a frame, on average"
     ),
     optional_key!(
@@ -339,12 +343,12 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     key!(
         missing,
-        Limits::FromTo(0.0, 1.0),
+        NumberRange::FromTo(0.0, 1.0),
         "part of the catalogue's stars that are not in the sky"
     ),
     key!(
         vmag_sigma,
-        Limits::FromTo(0.0, 10.0),
+        NumberRange::FromTo(0.0, 10.0),
         "standard deviation of the stars' magnitudes about the catalogue's"
     ),
     optional_key!(
@@ -354,12 +358,12 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     ),
     optional_key!(
         milky_way,
-        Limits::NotNegative,
+        NumberRange::NotNegative,
         "light of the Milky Way's faint stars, over what it is (else none)"
     ),
     key!(
         stray_light,
-        Limits::FromTo(0.0, 1.0),
+        NumberRange::FromTo(0.0, 1.0),
         "light that an all-sky lens scatters outside its circle, over the mean of the sky in it"
     ),
 ];

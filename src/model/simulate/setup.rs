@@ -3,7 +3,7 @@
 use super::camera::camera_of;
 use super::scene::{SCENE_KEYS, Scene};
 use super::strays::mean_cosmic_rays;
-use crate::camera::data_sheet::{IMPERFECTION_KEYS, Key, Limits};
+use crate::camera::data_sheet::{IMPERFECTION_KEYS, Key, NumberRange};
 use crate::model::sensitivity::{
     self, Budget, Scenario, ScenarioError, UnknownParameter, title_of,
 };
@@ -206,7 +206,7 @@ impl SetupParameter {
     }
 
     /// Valid values.
-    pub fn limits(self) -> Limits {
+    pub fn limits(self) -> NumberRange {
         match self {
             Self::Scenario(parameter) => parameter.limits(),
             Self::Scene(key) => key.limits,

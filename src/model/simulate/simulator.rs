@@ -4,14 +4,14 @@ use super::camera::{Pointing, camera_of};
 use super::color_camera::ColorCamera;
 use super::equivalent_spot::make_gaussian;
 use super::image::ElectronImage;
-use super::lights::{Light, lights};
+use super::lights::{BrightLight, lights};
 use super::milky_way::MilkyWay;
-use super::motion::Motion;
+use super::motion::StarMotion;
 use super::pattern::DetectorPattern;
 use super::poisson::PoissonTable;
 use super::readout::{Readout, collect};
 use super::scene::Scene;
-use super::sky::Sky;
+use super::sky::SimulatedSky;
 use super::spot::SpotRenderer;
 use super::stars::StarSampler;
 use super::strays::{self, CosmicRay, Trail};
@@ -133,7 +133,7 @@ impl<'a> Simulator<'a> {
         };
         let mut random = random(0, FrameStream::Scene);
         let mut image = self.image();
-        Sky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut image, 1.0);
+        SimulatedSky::new(&self.scenario, &none, &self.camera, &mut random).expose(&mut image, 1.0);
         let sky_mag = conditions.sky.mag_arcsec2() - 2.5 * libm::log10(mean(image.pixels()));
         conditions.sky = SkyBrightness::MagArcsec2(sky_mag);
         make_gaussian(&mut uniform.camera);
@@ -173,7 +173,7 @@ impl<'a> Simulator<'a> {
         }
     }
 
-    fn sky(&self, pointing: Option<&Pointing>, random: &mut ChaCha8Rng) -> Sky<'_> {
+    fn sky(&self, pointing: Option<&Pointing>, random: &mut ChaCha8Rng) -> SimulatedSky<'_> {
         let mag_arcsec2 = self.scenario.conditions.sky.mag_arcsec2();
         let milky_way =
             pointing.and_then(|pointing| MilkyWay::new(&self.scene, pointing, mag_arcsec2));
@@ -181,12 +181,12 @@ impl<'a> Simulator<'a> {
             let zenith = pointing.places.zenith()?;
             Some(pointing.icrs_to_camera.apply(zenith))
         });
-        Sky::new(&self.scenario, &self.scene, &self.camera, random)
+        SimulatedSky::new(&self.scenario, &self.scene, &self.camera, random)
             .under(zenith)
             .with(milky_way)
     }
 
-    fn lights(&self, seed: u64) -> Vec<Light> {
+    fn lights(&self, seed: u64) -> Vec<BrightLight> {
         let random = random(seed, FrameStream::Lights);
         lights(
             (&self.scenario, &self.scene),
@@ -233,7 +233,7 @@ impl<'a> Simulator<'a> {
     /// As [`Self::frame`].
     pub fn evenly_lit(&self, electrons: f64, seed: u64) -> Result<Frame<'static>, FrameError> {
         let none = Scene::default();
-        let sky = Sky::new(
+        let sky = SimulatedSky::new(
             &self.scenario,
             &none,
             &self.camera,
@@ -264,7 +264,7 @@ impl<'a> Simulator<'a> {
         let mut random = random(seed, FrameStream::Scene);
         let angular_rate_rad_s = scene.angular_rate_rad_s(&mut random);
         let turn_rad = angular_rate_rad_s * exposure_s;
-        let motion = Motion::new(&self.camera, turn_rad, conditions.motion_px);
+        let motion = StarMotion::new(&self.camera, turn_rad, conditions.motion_px);
         let sky = self.sky(pointing, &mut random);
         let mut image = self.image();
         sky.expose(&mut image, budget.background_e);
@@ -309,7 +309,7 @@ impl<'a> Simulator<'a> {
     fn draw_trail(
         &self,
         trail: &Trail,
-        sky: &Sky,
+        sky: &SimulatedSky,
         image: &mut ElectronImage,
         spot: &mut SpotRenderer,
     ) {

@@ -22,12 +22,12 @@ const GRID_PX: usize = 16;
 const WAVES: usize = 16;
 
 /// The sky of one frame, relative to the uniform one of the scenario.
-pub(super) struct Sky<'a> {
+pub(super) struct SimulatedSky<'a> {
     camera: &'a CameraModel,
     vignetting: f64,
     /// Change of the brightness per pixel along x and y.
     slope: [f64; 2],
-    clouds: Option<Clouds>,
+    clouds: Option<CloudField>,
     moonlight: Option<Moonlight>,
     skyline: Option<Skyline>,
     altitudes: Option<Altitudes>,
@@ -36,7 +36,7 @@ pub(super) struct Sky<'a> {
 }
 
 /// Parts of the light at a place.
-struct Parts {
+struct LightParts {
     /// Change by the gradient.
     gradient: f64,
     /// Airglow.
@@ -47,13 +47,13 @@ struct Parts {
     milky_way: f64,
 }
 
-impl Parts {
+impl LightParts {
     fn light(&self) -> f64 {
         self.gradient.max(0.0) * self.glow * (1.0 + self.moon + self.cloud) + self.milky_way
     }
 }
 
-impl<'a> Sky<'a> {
+impl<'a> SimulatedSky<'a> {
     pub(super) fn new(
         scenario: &Scenario,
         scene: &Scene,
@@ -66,7 +66,7 @@ impl<'a> Sky<'a> {
         let to_border_px = half_x * sin.abs() + half_y * cos.abs();
         let steepness = scene.sky_gradient / to_border_px;
         // Always drawn, so that later random numbers do not depend on the scene.
-        let clouds = Clouds::new(scene, camera, random);
+        let clouds = CloudField::new(scene, camera, random);
         Self {
             camera,
             vignetting: scenario.camera.imperfections.vignetting,
@@ -155,9 +155,9 @@ impl<'a> Sky<'a> {
                 let gradient = gradient_y + self.slope[0] * (place.x - centre.x);
                 let moon = moon.as_ref().map_or(0.0, |grid| grid.at(x, y));
                 let cloud = clouds.as_ref().map_or(0.0, |(light, grid)| {
-                    light * Clouds::thickness_of(grid.at(x, y))
+                    light * CloudField::thickness_of(grid.at(x, y))
                 });
-                let parts = Parts {
+                let parts = LightParts {
                     gradient,
                     glow: glow.as_ref().map_or(1.0, |grid| grid.at(x, y)),
                     moon,
@@ -196,11 +196,11 @@ impl<'a> Sky<'a> {
         let moon = self.moonlight.as_ref();
         let moon = moon.map_or(0.0, |moon| moon.at(self.camera, place));
         let cloud = self.clouds.as_ref().map_or(0.0, |clouds| {
-            clouds.light * Clouds::thickness_of(clouds.height(place))
+            clouds.light * CloudField::thickness_of(clouds.height(place))
         });
         let altitudes = self.altitudes.as_ref();
         let milky_way = self.milky_way.as_ref();
-        let parts = Parts {
+        let parts = LightParts {
             gradient,
             glow: altitudes.map_or(1.0, |altitudes| altitudes.glow(place, self.camera)),
             moon,
@@ -259,7 +259,7 @@ impl CoarseGrid {
 }
 
 /// Clouds: a random field composed of waves.
-struct Clouds {
+struct CloudField {
     extinction_mag: f64,
     /// Light of the thickest cloud relative to the clear sky.
     light: f64,
@@ -306,7 +306,7 @@ impl Bank {
     }
 }
 
-impl Clouds {
+impl CloudField {
     fn new(scene: &Scene, camera: &CameraModel, random: &mut ChaCha8Rng) -> Self {
         let mut wave = || {
             let angle = random.random_range(0.0..std::f64::consts::TAU);
@@ -491,7 +491,7 @@ mod tests {
         let camera = camera();
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut image = ElectronImage::new(400, 300, 0.0);
-        Sky::new(scenario, scene, &camera, &mut random).expose(&mut image, 100.0);
+        SimulatedSky::new(scenario, scene, &camera, &mut random).expose(&mut image, 100.0);
         image.into_pixels()
     }
 
@@ -556,7 +556,7 @@ mod tests {
             let camera = CameraModel::pinhole(400.0, 300.0, 1000.0, mirrored);
             let mut image = ElectronImage::new(400, 300, 0.0);
             let mut random = ChaCha8Rng::seed_from_u64(1);
-            Sky::new(&scenario, &scene, &camera, &mut random).expose(&mut image, 100.0);
+            SimulatedSky::new(&scenario, &scene, &camera, &mut random).expose(&mut image, 100.0);
             let row = image.row_mut(150);
             assert!(row[399] > 1.05 * row[0], "{} {}", row[0], row[399]);
         }
@@ -576,7 +576,7 @@ mod tests {
             ..Scene::default()
         };
         let mut random = ChaCha8Rng::seed_from_u64(3);
-        let sky = Sky::new(&scenario, &scene, &camera, &mut random);
+        let sky = SimulatedSky::new(&scenario, &scene, &camera, &mut random);
         let mut image = ElectronImage::new(400, 300, 0.0);
         sky.expose(&mut image, 100.0);
         let mut clouded = 0;
@@ -604,7 +604,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let toward = PixelPoint::new(350.0, 200.0);
         let zenith = camera.direction_of(&toward);
-        let sky = Sky::new(&scenario, &scene, &camera, &mut random).under(zenith);
+        let sky = SimulatedSky::new(&scenario, &scene, &camera, &mut random).under(zenith);
         let at_zenith = sky.transmission(&toward);
         for (x, y) in [(200.0, 150.0), (10.0, 10.0), (390.0, 290.0)] {
             let place = PixelPoint::new(x, y);
@@ -624,7 +624,7 @@ mod tests {
                 ..Scene::default()
             };
             let mut random = ChaCha8Rng::seed_from_u64(2);
-            let sky = Sky::new(&scenario, &scene, &camera, &mut random);
+            let sky = SimulatedSky::new(&scenario, &scene, &camera, &mut random);
             let mut image = ElectronImage::new(400, 300, 0.0);
             sky.expose(&mut image, 1.0);
             let off = |i: usize| {
@@ -662,7 +662,7 @@ mod tests {
             ..Scene::default()
         };
         let camera = camera();
-        let sky = Sky::new(
+        let sky = SimulatedSky::new(
             &scenario,
             &scene,
             &camera,

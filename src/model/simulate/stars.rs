@@ -3,7 +3,7 @@
 use super::camera::Pointing;
 use super::poisson::poisson;
 use super::scene::Scene;
-use super::sky::Sky;
+use super::sky::SimulatedSky;
 use super::strays::place;
 use super::truth::TrueStar;
 use crate::base::coords::UnitVector;
@@ -20,7 +20,7 @@ pub(super) struct StarSampler<'a> {
     pub(super) camera: &'a CameraModel,
     pub(super) scene: &'a Scene,
     pub(super) light: &'a StarLight,
-    pub(super) sky: &'a Sky<'a>,
+    pub(super) sky: &'a SimulatedSky<'a>,
 }
 
 impl StarSampler<'_> {

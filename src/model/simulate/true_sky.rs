@@ -1,14 +1,14 @@
 //! The true sky of a simulated frame at each place, without noise.
 
-use super::lights::Light;
-use super::sky::{Sky, solid_angle_sr};
+use super::lights::BrightLight;
+use super::sky::{SimulatedSky, solid_angle_sr};
 use crate::base::coords::PixelPoint;
 use crate::camera::CameraModel;
 
 /// The true sky of a simulated frame.
 pub struct TrueSky<'a> {
-    pub(super) sky: Sky<'a>,
-    pub(super) lights: Vec<Light>,
+    pub(super) sky: SimulatedSky<'a>,
+    pub(super) lights: Vec<BrightLight>,
     pub(super) camera: &'a CameraModel,
     /// V magnitudes per square arcsecond of the scenario's sky.
     pub(super) mag_arcsec2: f64,

@@ -49,7 +49,7 @@ pub struct FrameMeasurement<'a> {
     /// Share of the light lost in the corners.
     pub vignetting: f64,
     /// Places all over a wide field whose horizon is known.
-    pub places: Option<Vec<FieldPlace>>,
+    pub places: Option<Vec<FieldPosition>>,
     /// Light beyond the spots, over that of the spots.
     pub wings: f64,
     /// Standard deviation of a star's spot, in pixels.
@@ -79,7 +79,7 @@ pub struct FrameMeasurement<'a> {
 
 /// A place in the field.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FieldPlace {
+pub struct FieldPosition {
     /// By how much a star behind the air must be brighter to be detected than at the typical threshold, in
     /// magnitudes.
     pub brighter_mag: f64,

@@ -20,7 +20,7 @@ mod measurement;
 
 pub use contradiction::Contradiction;
 pub use measurement::ObservingSetup;
-pub(crate) use measurement::{FieldPlace, FieldStar, FrameMeasurement};
+pub(crate) use measurement::{FieldPosition, FieldStar, FrameMeasurement};
 
 use super::SUN_BV_MAG;
 use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
@@ -196,10 +196,10 @@ fn differences_by_lens(budget: &Budget, transmissions: &[f64], typical: f64) -> 
 }
 
 /// The same by the thresholds of places, and the air.
-fn differences_by_air(places: &[FieldPlace], budget: &Budget) -> Vec<f64> {
+fn differences_by_air(places: &[FieldPosition], budget: &Budget) -> Vec<f64> {
     let central_mag = -2.5 * libm::log10(budget.atmosphere_transmission);
     let difference_mag =
-        |place: &FieldPlace| -place.brighter_mag - central_mag * (place.airmass_ratio - 1.0);
+        |place: &FieldPosition| -place.brighter_mag - central_mag * (place.airmass_ratio - 1.0);
     places.iter().map(difference_mag).collect()
 }
 

@@ -4,7 +4,7 @@
 //! polynomial over the frame, and what is the same all around the axis. So only the form that no lens has
 //! counts: the steep rise on the one side of the frame where the horizon is.
 
-use super::sky::{NamedStar, Sky};
+use super::sky::{NamedStar, ObservedSky};
 use crate::base::statistics::median;
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::Identification;
@@ -34,7 +34,7 @@ const STARS_FOR_FIFTH: usize = 150;
 const MAX_SQUARE: f64 = 9.0;
 
 impl<'a> Bending<'a> {
-    pub fn new(sky: &Sky<'a>) -> Option<Self> {
+    pub fn new(sky: &ObservedSky<'a>) -> Option<Self> {
         let found = sky.found;
         let (stars, residuals) = airless_residuals(sky);
         if stars.len() < MIN_STARS {
@@ -135,7 +135,7 @@ fn shared(stars: &[NamedStar], weights: &[f64]) -> f64 {
 }
 
 /// The stars that the lens would show without air, and how far they are from there, in pixels.
-fn airless_residuals(sky: &Sky) -> (Vec<NamedStar>, [Vec<f64>; 2]) {
+fn airless_residuals(sky: &ObservedSky) -> (Vec<NamedStar>, [Vec<f64>; 2]) {
     let mut stars = Vec::with_capacity(sky.stars.len());
     let mut residuals = [Vec::new(), Vec::new()];
     for star in &sky.stars {

@@ -1,6 +1,6 @@
 //! What may be wrong with a stated place and time, and what it would be then.
 
-use super::sky::Sky;
+use super::sky::ObservedSky;
 use crate::base::clock::of_hours;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
@@ -96,7 +96,7 @@ impl Change {
 
 /// A changed place and time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Candidate {
+pub(super) struct PlaceTimeCandidate {
     pub change: Change,
     pub site: Site,
     pub date: ObservationDate,
@@ -106,8 +106,8 @@ pub(super) struct Candidate {
 pub(super) fn candidates(
     stated: (Site, ObservationDate),
     zenith: &UnitVector<Icrs>,
-    sky: &Sky,
-) -> Vec<Candidate> {
+    sky: &ObservedSky,
+) -> Vec<PlaceTimeCandidate> {
     let signs = [
         Change::LatitudeSign,
         Change::LongitudeSign,
@@ -124,7 +124,7 @@ pub(super) fn candidates(
     let changes = signs.into_iter().chain(hours).chain(days.map(Change::Days));
     let changed = |change: Change| {
         let (site, date) = change.of(stated)?;
-        Some(Candidate { change, site, date })
+        Some(PlaceTimeCandidate { change, site, date })
     };
     let place = level.and_then(|level| {
         let (_, lat_rad) = level.to_ra_dec();
@@ -135,7 +135,7 @@ pub(super) fn candidates(
         let site = stated
             .0
             .moved_to(rough(lat_rad * DEG_PER_RAD), rough(lon_deg))?;
-        Some(Candidate {
+        Some(PlaceTimeCandidate {
             change: Change::Place,
             site,
             date: stated.1,
@@ -147,17 +147,22 @@ pub(super) fn candidates(
 
 /// The dates whose numbers may have been misread, and those of a clock that is a year or two off. Few, so that
 /// chance hardly brings a planet to where a source is.
-pub(super) fn other_dates(stated: (Site, ObservationDate)) -> impl Iterator<Item = Candidate> {
+pub(super) fn other_dates(
+    stated: (Site, ObservationDate),
+) -> impl Iterator<Item = PlaceTimeCandidate> {
     let (site, date) = stated;
-    let orders = date.reordered().into_iter().map(move |date| Candidate {
-        change: Change::OrderOfDate,
-        site,
-        date,
-    });
+    let orders = date
+        .reordered()
+        .into_iter()
+        .map(move |date| PlaceTimeCandidate {
+            change: Change::OrderOfDate,
+            site,
+            date,
+        });
     let years = (-2..=2).filter(|years| *years != 0).map(Change::Years);
     let years = years.filter_map(move |change| {
         let (site, date) = change.of(stated)?;
-        Some(Candidate { change, site, date })
+        Some(PlaceTimeCandidate { change, site, date })
     });
     orders.chain(years)
 }

@@ -2,7 +2,7 @@
 
 use super::bending::Bending;
 use super::contradiction::Contradiction;
-use super::sky::Sky;
+use super::sky::ObservedSky;
 use super::sun;
 use crate::base::epoch::ObservationDate;
 use crate::ephemeris::observer::Site;
@@ -11,7 +11,7 @@ use crate::pipeline::source::Source;
 
 /// What a frame shows, ready to be held against places and times.
 pub(super) struct Examination<'a> {
-    pub sky: &'a Sky<'a>,
+    pub sky: &'a ObservedSky<'a>,
     pub sources: &'a [Source],
     pub bending: Option<Bending<'a>>,
 }
@@ -32,7 +32,7 @@ pub(super) struct Assessed<'e, 'a> {
 }
 
 impl<'a> Examination<'a> {
-    pub fn new(sky: &'a Sky<'a>, sources: &'a [Source]) -> Self {
+    pub fn new(sky: &'a ObservedSky<'a>, sources: &'a [Source]) -> Self {
         Self {
             sky,
             sources,

@@ -28,7 +28,7 @@ mod zone;
 pub use change::Change;
 pub use contradiction::Contradiction;
 pub use proposal::{PlaceTime, Proposal};
-pub(super) use sky::Sky;
+pub(super) use sky::ObservedSky;
 
 use super::identification::observation;
 use super::outcome::Outcome;
@@ -39,11 +39,11 @@ use crate::catalog::Catalog;
 use crate::ephemeris::observer::Site;
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::{DateZone, FrameDate, Priors};
-use change::{Candidate, candidates};
+use change::{PlaceTimeCandidate, candidates};
 use examination::{Assessed, Examination};
 
 /// An identified frame, with the place and the time that were found good for it.
-pub(super) struct Settled {
+pub(super) struct ConfirmedPlaceTime {
     pub outcome: Outcome,
     /// Where the catalogue's stars appear.
     pub places: StarPlaces,
@@ -60,8 +60,8 @@ pub(super) fn settle(
     (priors, offset): (&Priors, Option<UtcOffset>),
     (sources, catalog): (&[Source], &Catalog),
     mut identify: impl FnMut(StarPlaces) -> (Outcome, StarPlaces),
-) -> Settled {
-    let mut settled = Settled {
+) -> ConfirmedPlaceTime {
+    let mut settled = ConfirmedPlaceTime {
         outcome,
         places,
         priors: *priors,
@@ -75,7 +75,7 @@ pub(super) fn settle(
     };
     let examined = |outcome: &Outcome| {
         let found = outcome.identification()?;
-        let sky = Sky::new(found, sources, catalog);
+        let sky = ObservedSky::new(found, sources, catalog);
         let examination = Examination::new(&sky, sources);
         let assessed = examination.of(site, date);
         let verdict = verdict(&assessed);
@@ -102,7 +102,7 @@ pub(super) fn settle(
     settled
 }
 
-impl Settled {
+impl ConfirmedPlaceTime {
     /// The place, and the time as it is stated or assumed.
     fn stated(&self) -> Option<(Site, ObservationDate)> {
         let known = self.priors.date.filter(|known| known.date.has_time())?;
@@ -124,7 +124,7 @@ impl Settled {
         let (Some(local), Some(site), Some(found)) = (local, self.priors.site, found) else {
             return;
         };
-        let sky = Sky::new(found, sources, catalog);
+        let sky = ObservedSky::new(found, sources, catalog);
         let examination = Examination::new(&sky, sources);
         let Some((ahead, date)) = zone::by_stars(&examination, site, local.date) else {
             return;
@@ -167,11 +167,13 @@ fn verdict(assessed: &Assessed) -> Option<PlaceTime> {
         ),
         (None, None) => Vec::new(),
     };
-    let held = others.into_iter().filter_map(|candidate: Candidate| {
-        let other = assessed.examination.of(candidate.site, candidate.date);
-        let is_possible = other.contradictions().is_empty();
-        is_possible.then(|| (candidate, other.cost() + candidate.change.rarity()))
-    });
+    let held = others
+        .into_iter()
+        .filter_map(|candidate: PlaceTimeCandidate| {
+            let other = assessed.examination.of(candidate.site, candidate.date);
+            let is_possible = other.contradictions().is_empty();
+            is_possible.then(|| (candidate, other.cost() + candidate.change.rarity()))
+        });
     Some(PlaceTime {
         stated: None,
         contradictions,

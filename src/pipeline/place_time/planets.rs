@@ -2,7 +2,7 @@
 //!
 //! A planet that is missing alone says little: it may be behind a tree, and drawn frames have none.
 
-use super::change::{Candidate, other_dates};
+use super::change::{PlaceTimeCandidate, other_dates};
 use super::contradiction::Contradiction;
 use super::examination::Assessed;
 use crate::base::coords::{PixelPoint, UnitVector};
@@ -30,7 +30,9 @@ struct Stranger {
 
 /// That a conspicuous planet is missing, with the dates that have one where a bright source is no star, and
 /// miss none.
-pub(super) fn contradiction(assessed: &Assessed) -> Option<(Contradiction, Vec<Candidate>)> {
+pub(super) fn contradiction(
+    assessed: &Assessed,
+) -> Option<(Contradiction, Vec<PlaceTimeCandidate>)> {
     let strangers = strangers(assessed);
     if strangers.is_empty() {
         return None;
@@ -60,8 +62,8 @@ pub(super) fn contradiction(assessed: &Assessed) -> Option<(Contradiction, Vec<C
 }
 
 impl Assessed<'_, '_> {
-    fn as_candidate(&self) -> Candidate {
-        Candidate {
+    fn as_candidate(&self) -> PlaceTimeCandidate {
+        PlaceTimeCandidate {
             change: super::Change::Hours(0.0),
             site: self.site,
             date: self.date,
@@ -122,7 +124,7 @@ fn strangers(assessed: &Assessed) -> Vec<Stranger> {
 }
 
 /// The bright planets in the frame at a place and time.
-fn bodies_of(assessed: &Assessed, candidate: &Candidate) -> Vec<BodyInFrame> {
+fn bodies_of(assessed: &Assessed, candidate: &PlaceTimeCandidate) -> Vec<BodyInFrame> {
     let found = assessed.examination.sky.found;
     let bodies = bodies_at(&candidate.date, TimeError::None, Some(candidate.site));
     let bright = bodies

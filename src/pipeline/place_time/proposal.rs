@@ -1,6 +1,6 @@
 //! What would put a place and a time right.
 
-use super::change::{Candidate, Change, longitude_of_hours};
+use super::change::{Change, PlaceTimeCandidate, longitude_of_hours};
 use super::contradiction::Contradiction;
 use crate::base::epoch::ObservationDate;
 use crate::base::format::counted;
@@ -41,7 +41,7 @@ pub struct Proposal {
 const MAX_ODDS: f64 = 50.0;
 
 /// Of changes with their costs, those that are nearly as good as the best, one of each kind.
-pub(super) fn of(mut assessed: Vec<(Candidate, f64)>) -> Vec<Proposal> {
+pub(super) fn of(mut assessed: Vec<(PlaceTimeCandidate, f64)>) -> Vec<Proposal> {
     assessed.sort_by(|a, b| a.1.total_cmp(&b.1));
     let Some(least) = assessed.first().map(|(_, cost)| *cost) else {
         return Vec::new();

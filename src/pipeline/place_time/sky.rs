@@ -20,14 +20,14 @@ pub(super) struct NamedStar {
 
 /// What a frame shows of the sky over its place.
 #[derive(Debug)]
-pub(crate) struct Sky<'a> {
+pub(crate) struct ObservedSky<'a> {
     pub(super) found: &'a Identification,
     pub(super) stars: Vec<NamedStar>,
     /// The largest angle of a named star from the lens's axis.
     field_rad: f64,
 }
 
-impl<'a> Sky<'a> {
+impl<'a> ObservedSky<'a> {
     pub fn new(found: &'a Identification, sources: &[Source], catalog: &Catalog) -> Self {
         /// Names that are less sure are left out.
         const MAX_CHANCE: f64 = 0.01;

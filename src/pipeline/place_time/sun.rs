@@ -1,6 +1,6 @@
 //! The Sun: what it hides, and where it would be.
 
-use super::sky::Sky;
+use super::sky::ObservedSky;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
@@ -15,7 +15,7 @@ pub(super) fn altitude_rad(date: &ObservationDate, site: Site, zenith: &UnitVect
 
 /// By how many magnitudes the fainter of the named stars are fainter than what the sky lit by the Sun hides from
 /// any camera; below 0 where it hides nothing.
-pub(super) fn hidden_mag(sky: &Sky, sun_rad: f64) -> f64 {
+pub(super) fn hidden_mag(sky: &ObservedSky, sun_rad: f64) -> f64 {
     /// Fewer stars may be anything.
     const MIN_STARS: usize = 10;
     /// A spot with so small a share of the light of its pixels is lost in the noise of any detector.

@@ -31,7 +31,7 @@ pub(super) struct Stroke {
 
 /// Something that is drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Shape {
+pub(super) enum DrawnShape {
     Circle {
         center: [f32; 2],
         radius: f32,
@@ -56,7 +56,7 @@ pub(super) enum Shape {
 /// A drawing over a picture. Sizes of strokes and letters are in units that suit the picture's size.
 pub(super) struct Canvas {
     pub(super) size: Size,
-    pub(super) shapes: Vec<Shape>,
+    pub(super) shapes: Vec<DrawnShape>,
     /// Pixels per unit.
     pub(super) unit: f32,
 }
@@ -86,7 +86,7 @@ impl Canvas {
     /// Draws a circle; `radius` in pixels.
     pub(super) fn ring(&mut self, center: [f32; 2], radius: f32, width: f32, color: Rgb) {
         let stroke = self.stroke(width, color, None);
-        self.shapes.push(Shape::Circle {
+        self.shapes.push(DrawnShape::Circle {
             center,
             radius,
             stroke,
@@ -98,7 +98,7 @@ impl Canvas {
         /// Length of dashes.
         const DASH: f32 = 4.0;
         let stroke = self.stroke(width, color, Some(DASH));
-        self.shapes.push(Shape::Circle {
+        self.shapes.push(DrawnShape::Circle {
             center,
             radius,
             stroke,
@@ -109,14 +109,14 @@ impl Canvas {
     pub(super) fn line(&mut self, points: &[[f32; 2]], width: f32, color: Rgb) {
         let stroke = self.stroke(width, color, None);
         let points = points.to_vec();
-        self.shapes.push(Shape::Line { points, stroke });
+        self.shapes.push(DrawnShape::Line { points, stroke });
     }
 
     /// Draws `text` with a dark border, its baseline beginning at `at`; `size` in units.
     pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, color: Rgb) {
         /// Width of the border, in units.
         const HALO: f32 = 3.0;
-        self.shapes.push(Shape::Text {
+        self.shapes.push(DrawnShape::Text {
             text: text.to_owned(),
             at,
             size: size * self.unit,

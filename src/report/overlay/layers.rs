@@ -1,9 +1,9 @@
 //! What of the sky is drawn over a frame, layer by layer, for pages that draw it themselves.
 
-use super::canvas::{Canvas, Shape};
+use super::canvas::{Canvas, DrawnShape};
 use super::labels::Room;
 use super::picture::Picture;
-use super::sky::Layer;
+use super::sky::OverlayLayer;
 use crate::base::format::to_decimals;
 use crate::base::size::Size;
 use crate::identify::Identification;
@@ -30,17 +30,17 @@ pub(in crate::report) fn sky_layers(size: Size, found: &Identification) -> Vec<S
     let picture = Picture::empty(size);
     let unit = picture.stroke_unit();
     let image = [size.width as f32, size.height as f32];
-    let drawn = |layer: Layer| {
+    let drawn = |layer: OverlayLayer| {
         let mut canvas = Canvas::new(size, unit);
         layer.draw(&mut canvas, &picture, found, &mut Room::all(image, unit));
         SkyLayer::of(layer, canvas)
     };
-    let layers = Layer::ALL.into_iter().map(drawn);
+    let layers = OverlayLayer::ALL.into_iter().map(drawn);
     layers.filter(|layer| !layer.is_empty()).collect()
 }
 
 impl SkyLayer {
-    fn of(layer: Layer, canvas: Canvas) -> Self {
+    fn of(layer: OverlayLayer, canvas: Canvas) -> Self {
         let (key, title) = names(layer);
         let mut this = Self {
             key,
@@ -51,14 +51,14 @@ impl SkyLayer {
         };
         for shape in canvas.shapes {
             match shape {
-                Shape::Line { points, .. } => {
+                DrawnShape::Line { points, .. } => {
                     this.lines.push(points.into_iter().map(pixel).collect());
                 }
-                Shape::Circle { center, radius, .. } => {
+                DrawnShape::Circle { center, radius, .. } => {
                     let [x, y] = pixel(center);
                     this.circles.push([x, y, rounded(radius)]);
                 }
-                Shape::Text { text, at, .. } => this.texts.push((text, pixel(at))),
+                DrawnShape::Text { text, at, .. } => this.texts.push((text, pixel(at))),
             }
         }
         this
@@ -69,13 +69,13 @@ impl SkyLayer {
     }
 }
 
-fn names(layer: Layer) -> (&'static str, &'static str) {
+fn names(layer: OverlayLayer) -> (&'static str, &'static str) {
     match layer {
-        Layer::Horizon => ("horizon", "horizon"),
-        Layer::EquatorialGrid => ("equatorial", "right ascension and declination"),
-        Layer::HorizontalGrid => ("horizontal", "azimuth and altitude"),
-        Layer::DeepSky => ("deepsky", "clusters and nebulae"),
-        Layer::Constellations => ("constellations", "constellations"),
+        OverlayLayer::Horizon => ("horizon", "horizon"),
+        OverlayLayer::EquatorialGrid => ("equatorial", "right ascension and declination"),
+        OverlayLayer::HorizontalGrid => ("horizontal", "azimuth and altitude"),
+        OverlayLayer::DeepSky => ("deepsky", "clusters and nebulae"),
+        OverlayLayer::Constellations => ("constellations", "constellations"),
     }
 }
 

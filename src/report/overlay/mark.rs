@@ -86,7 +86,7 @@ pub(super) fn marks(
     picture: &Picture,
     label: LabelKind,
 ) -> Vec<Mark> {
-    let rings = Rings::of(&solution.sources, picture);
+    let rings = RingRadii::of(&solution.sources, picture);
     let is_body = |index: usize| {
         let mut bodies = solution.bodies.iter().filter_map(|body| body.source);
         bodies.any(|source| source.get() == index)
@@ -140,14 +140,14 @@ fn kind(source: &Source, identified: bool) -> MarkKind {
 }
 
 /// Radii of rings, in pixels of the picture.
-struct Rings {
+struct RingRadii {
     /// The flux of the smallest ring.
     flux: f64,
     smallest: f32,
     unit: f32,
 }
 
-impl Rings {
+impl RingRadii {
     /// The radii for `sources`, brightest first.
     fn of(sources: &[Source], picture: &Picture) -> Self {
         /// Smallest radius in pixels of the frame: enlarged stars need larger rings.

@@ -232,7 +232,7 @@ fn photograph(
 ) -> Vec<[u8; 3]> {
     let Some(colors) = colors else {
         let light = squares.light();
-        let curve = Curve::of(&light, squares.frame.step_adu, sky_levels);
+        let curve = StretchCurve::of(&light, squares.frame.step_adu, sky_levels);
         let levels: Vec<u8> = light.iter().map(|level| curve.apply(*level)).collect();
         return grey(&levels);
     };
@@ -241,7 +241,7 @@ fn photograph(
     let pixels: Vec<[f32; 3]> = all.map(|((r, g), b)| [*r, *g, *b]).collect();
     let luminance = |pixel: &[f32; 3]| luminance(*pixel, f32::INFINITY);
     let light: Vec<f32> = pixels.iter().map(luminance).collect();
-    let curve = Curve::of(&light, colors.step, sky_levels);
+    let curve = StretchCurve::of(&light, colors.step, sky_levels);
     let color = |pixel: &[f32; 3]| pixel.map(|level| curve.apply(level));
     pixels.iter().map(color).collect()
 }
@@ -252,13 +252,13 @@ fn grey(levels: &[u8]) -> Vec<[u8; 3]> {
 }
 
 /// A curve from light to levels of a picture.
-struct Curve {
+struct StretchCurve {
     black: f32,
     range: f32,
     middle: f32,
 }
 
-impl Curve {
+impl StretchCurve {
     /// The curve for a picture with this light.
     fn of(light: &[f32], step: f32, sky_levels: Option<[f32; 2]>) -> Self {
         /// Most levels of the picture between two of the frame: more are seen as edges.
@@ -503,7 +503,7 @@ mod tests {
         };
         // The level that a quarter of the picture exceeds.
         let sky_of = |light: &[f32], sky_levels| {
-            let curve = Curve::of(light, 0.0, sky_levels);
+            let curve = StretchCurve::of(light, 0.0, sky_levels);
             let mut levels: Vec<u8> = light.iter().map(|level| curve.apply(*level)).collect();
             levels.sort_unstable();
             levels[light.len() * 3 / 4]

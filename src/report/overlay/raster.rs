@@ -1,6 +1,6 @@
 //! A drawing as pixels.
 
-use super::canvas::{Canvas, Rgb, Shape, Stroke};
+use super::canvas::{Canvas, DrawnShape, Rgb, Stroke};
 use super::letters;
 use super::picture::Picture;
 use image::RgbImage;
@@ -38,9 +38,9 @@ fn background(canvas: &Canvas, picture: &Picture) -> Pixmap {
     pixmap
 }
 
-fn draw(pixmap: &mut Pixmap, shape: &Shape) {
+fn draw(pixmap: &mut Pixmap, shape: &DrawnShape) {
     match shape {
-        Shape::Circle {
+        DrawnShape::Circle {
             center: [x, y],
             radius,
             stroke,
@@ -49,7 +49,7 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
                 draw_stroke(pixmap, &path, *stroke, 255);
             }
         }
-        Shape::Line { points, stroke } => {
+        DrawnShape::Line { points, stroke } => {
             let mut builder = PathBuilder::new();
             for (i, [x, y]) in points.iter().enumerate() {
                 if i == 0 {
@@ -62,7 +62,7 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
                 draw_stroke(pixmap, &path, *stroke, 255);
             }
         }
-        Shape::Text {
+        DrawnShape::Text {
             text,
             at,
             size,

@@ -1,6 +1,6 @@
 //! A drawing as SVG, its picture as JPEG within it.
 
-use super::canvas::{Canvas, Rgb, Shape, Stroke};
+use super::canvas::{Canvas, DrawnShape, Rgb, Stroke};
 use super::encode;
 use super::letters::text_width;
 use super::picture::Picture;
@@ -43,9 +43,9 @@ pub(super) fn document(canvas: &Canvas, picture: Picture) -> io::Result<String> 
     Ok(svg)
 }
 
-fn write_shape(svg: &mut String, shape: &Shape) -> std::fmt::Result {
+fn write_shape(svg: &mut String, shape: &DrawnShape) -> std::fmt::Result {
     match shape {
-        Shape::Circle {
+        DrawnShape::Circle {
             center: [x, y],
             radius,
             stroke,
@@ -54,7 +54,7 @@ fn write_shape(svg: &mut String, shape: &Shape) -> std::fmt::Result {
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" {}/>",
             attributes(stroke)
         ),
-        Shape::Line { points, stroke } => {
+        DrawnShape::Line { points, stroke } => {
             let points: Vec<String> = points
                 .iter()
                 .map(|[x, y]| format!("{x:.1},{y:.1}"))
@@ -62,7 +62,7 @@ fn write_shape(svg: &mut String, shape: &Shape) -> std::fmt::Result {
             let (points, stroke) = (points.join(" "), attributes(stroke));
             writeln!(svg, "<polyline points=\"{points}\" {stroke}/>")
         }
-        Shape::Text {
+        DrawnShape::Text {
             text,
             at: [x, y],
             size,
@@ -109,12 +109,12 @@ mod tests {
             dash: Some(4.0),
         };
         let points = vec![[0.0, 1.0], [2.25, 3.0]];
-        write_shape(&mut svg, &Shape::Line { points, stroke }).unwrap();
+        write_shape(&mut svg, &DrawnShape::Line { points, stroke }).unwrap();
         assert_eq!(
             svg,
             "<polyline points=\"0.0,1.0 2.2,3.0\" stroke=\"#ff0010\" stroke-width=\"1.50\" stroke-dasharray=\"4.0\"/>\n"
         );
-        let text = Shape::Text {
+        let text = DrawnShape::Text {
             text: "<a&b>".to_owned(),
             at: [1.0, 2.0],
             size: 10.0,

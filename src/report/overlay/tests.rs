@@ -238,7 +238,7 @@ fn texts(sky: SkyLayers, solution: &Solution) -> Vec<String> {
         &options,
     );
     let texts = canvas.shapes.into_iter().filter_map(|shape| match shape {
-        canvas::Shape::Text { text, .. } => Some(text),
+        canvas::DrawnShape::Text { text, .. } => Some(text),
         _ => None,
     });
     texts.collect()

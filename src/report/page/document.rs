@@ -1,7 +1,7 @@
 //! The page of anything but a frame, from a plain description.
 
 use super::table::PageTable;
-use super::template::{Kind, picture_address, render};
+use super::template::{PageKind, picture_address, render};
 use crate::frame::Frame;
 use crate::report::overlay::thumbnail;
 use minijinja::context;
@@ -9,14 +9,14 @@ use minijinja::value::{Serde, Value};
 use serde::Serialize;
 use std::io;
 
-const DOCUMENT: Kind = Kind {
+const DOCUMENT: PageKind = PageKind {
     template: "document.html",
     script: include_str!("document.js"),
 };
 
 /// What a page says, in the order in which it says it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Page {
+pub struct PageContent {
     /// Name of the page.
     pub title: String,
     /// What was asked, in a sentence.
@@ -106,7 +106,7 @@ impl Thumbnail {
     }
 }
 
-impl Page {
+impl PageContent {
     /// The page as HTML.
     ///
     /// # Errors
@@ -126,7 +126,7 @@ mod tests {
     fn names_are_text_and_neither_tags_nor_the_end_of_a_script() {
         let name = "</script><b>\"'".to_owned();
         let frame = Frame::new(64, 48, vec![0.5; 64 * 48]).unwrap();
-        let page = Page {
+        let page = PageContent {
             title: name.clone(),
             answer: name.clone(),
             facts: vec![Fact::new(name.clone(), name.clone())],
@@ -134,7 +134,7 @@ mod tests {
             thumbnails: vec![Thumbnail::new(name.clone(), name.clone(), &frame).unwrap()],
             tables: vec![PageTable::from_csv(&name, "a,b\n</script><b>,1\n").unwrap()],
             provenance: vec![Fact::new("options", name.clone())],
-            ..Page::default()
+            ..PageContent::default()
         };
         let html = page.to_html().unwrap();
         assert!(!html.contains("</script><b>"));

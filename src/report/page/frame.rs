@@ -4,7 +4,7 @@
 //! completeness with the predicted limit.
 
 use super::data::PageData;
-use super::template::{Kind, picture_address, render, render_view, shown_data};
+use super::template::{PageKind, picture_address, render, render_view, shown_data};
 use crate::frame::Frame;
 use crate::pipeline::Solution;
 use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
@@ -13,7 +13,7 @@ use minijinja::context;
 use minijinja::value::{Serde, Value};
 use std::io;
 
-const FRAME: Kind = Kind {
+const FRAME: PageKind = PageKind {
     template: "frame.html",
     script: concat!(
         include_str!("frame.js"),

@@ -18,7 +18,7 @@ mod frame;
 mod table;
 mod template;
 
-pub use document::{Fact, Page, PageFigure, Thumbnail};
+pub use document::{Fact, PageContent, PageFigure, Thumbnail};
 pub use frame::html;
 pub use frame::{FrameView, preview, view};
 pub use table::PageTable;

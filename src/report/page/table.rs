@@ -11,20 +11,20 @@ const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
 pub struct PageTable {
     title: String,
     rows: usize,
-    columns: Vec<Column>,
+    columns: Vec<PageColumn>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
-struct Column {
+struct PageColumn {
     name: String,
     #[serde(flatten)]
-    cells: Cells,
+    cells: ColumnCells,
 }
 
 /// The cells of a column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
-enum Cells {
+enum ColumnCells {
     Numbers(Vec<Option<Number>>),
     Texts(Texts),
 }
@@ -63,9 +63,9 @@ impl PageTable {
         let column = |(place, name): (usize, &str)| {
             let cells: Vec<&str> = rows.iter().map(|row| &row[place]).collect();
             let is_empty = cells.iter().all(|cell| cell.is_empty());
-            (!is_empty).then(|| Column {
+            (!is_empty).then(|| PageColumn {
                 name: name.to_owned(),
-                cells: Cells::of(&cells),
+                cells: ColumnCells::of(&cells),
             })
         };
         Ok(Self {
@@ -80,7 +80,7 @@ impl PageTable {
     }
 }
 
-impl Cells {
+impl ColumnCells {
     fn of(cells: &[&str]) -> Self {
         let number = |cell: &&str| match *cell {
             "" => Some(None),

@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::io;
 
 /// A page of one kind.
-pub(super) struct Kind {
+pub(super) struct PageKind {
     /// Its template.
     pub(super) template: &'static str,
     /// What its script does, beside tables.
@@ -28,7 +28,7 @@ const TEMPLATES: [(&str, &str); 6] = [
 ];
 
 /// The page of `kind` with `values` in its template and `data` for its script.
-pub(super) fn render(kind: &Kind, values: Value, data: &impl Serialize) -> io::Result<String> {
+pub(super) fn render(kind: &PageKind, values: Value, data: &impl Serialize) -> io::Result<String> {
     let script = [
         "\"use strict\";\n(() => {\n",
         include_str!("table.js"),
@@ -48,11 +48,11 @@ pub(super) fn render(kind: &Kind, values: Value, data: &impl Serialize) -> io::R
 }
 
 /// What is within such a page, for another one that has its style and script already.
-pub(super) fn render_view(kind: &Kind, values: Value) -> io::Result<String> {
+pub(super) fn render_view(kind: &PageKind, values: Value) -> io::Result<String> {
     fill(kind, context! { base => "view.html", ..values })
 }
 
-fn fill(kind: &Kind, values: Value) -> io::Result<String> {
+fn fill(kind: &PageKind, values: Value) -> io::Result<String> {
     let mut environment = Environment::new();
     environment.set_formatter(format_text);
     for (name, source) in TEMPLATES {

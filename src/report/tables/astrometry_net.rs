@@ -12,7 +12,7 @@ use crate::report::{FrameReport, StarReport};
 
 /// A detection and its star. Names are those of astrometry.net.
 #[derive(Debug, Default)]
-struct Pair {
+struct CorrRow {
     field_x: f64,
     field_y: f64,
     field_ra: Option<f64>,
@@ -28,15 +28,15 @@ struct Pair {
 }
 
 /// The direction of a star.
-struct Place {
+struct RdlsRow {
     ra: f64,
     dec: f64,
 }
 
 /// The pairs of detections and stars, brightest first.
 pub(super) fn corr(report: &FrameReport, solution: &Solution) -> Vec<u8> {
-    let mut columns: Vec<Column<Pair>> = columns! {
-        Pair:
+    let mut columns: Vec<Column<CorrRow>> = columns! {
+        CorrRow:
         field_x, "pix", "", "detection, along the rows";
         field_y, "pix", "", "detection, along the columns";
         field_ra, "deg", "", "direction of the detection";
@@ -58,8 +58,8 @@ pub(super) fn corr(report: &FrameReport, solution: &Solution) -> Vec<u8> {
 
 /// The directions of the identified stars, brightest first.
 pub(super) fn rdls(report: &FrameReport) -> Vec<u8> {
-    let mut columns: Vec<Column<Place>> = columns! {
-        Place:
+    let mut columns: Vec<Column<RdlsRow>> = columns! {
+        RdlsRow:
         ra, "deg", "pos.eq.ra", "right ascension (ICRS)";
         dec, "deg", "pos.eq.dec", "declination (ICRS)";
     };
@@ -69,13 +69,13 @@ pub(super) fn rdls(report: &FrameReport) -> Vec<u8> {
     let named = report.stars.iter().filter(|star| star.id.is_some());
     let place = |star: &StarReport| {
         let (ra, dec) = star.ra_deg.zip(star.dec_deg)?;
-        Some(Place { ra, dec })
+        Some(RdlsRow { ra, dec })
     };
-    let places: Vec<Place> = named.filter_map(place).collect();
+    let places: Vec<RdlsRow> = named.filter_map(place).collect();
     fits_table::file("RDLS", &columns, &places)
 }
 
-fn pairs(report: &FrameReport, solution: &Solution) -> Vec<Pair> {
+fn pairs(report: &FrameReport, solution: &Solution) -> Vec<CorrRow> {
     let Some(found) = solution.outcome.identification() else {
         return Vec::new();
     };
@@ -91,7 +91,7 @@ fn pairs(report: &FrameReport, solution: &Solution) -> Vec<Pair> {
         let seen = found.apparent_direction_of(source);
         let seen = seen.map(|apparent| found.places.astrometric(&apparent).to_ra_dec());
         let (ra_rad, dec_rad) = seen.unzip();
-        Some(Pair {
+        Some(CorrRow {
             field_x,
             field_y,
             field_ra: ra_rad.map(f64::to_degrees),

@@ -11,10 +11,10 @@ const NO_INTEGER: i64 = i64::MIN;
 
 /// A file with one table. Texts are ASCII: other characters become question marks.
 pub(super) fn file<R>(name: &str, columns: &[Column<R>], rows: &[R]) -> Vec<u8> {
-    let formats: Vec<Format> = columns
+    let formats: Vec<ColumnFormat> = columns
         .iter()
         .zip(widths(columns, rows))
-        .map(|(column, width)| Format::of(&column.empty, width))
+        .map(|(column, width)| ColumnFormat::of(&column.empty, width))
         .collect();
     let row_bytes: usize = formats.iter().map(|format| format.bytes()).sum();
     let mut bytes = primary_header();
@@ -48,7 +48,7 @@ fn primary_header() -> Vec<u8> {
 fn table_header<R>(
     name: &str,
     columns: &[Column<R>],
-    formats: &[Format],
+    formats: &[ColumnFormat],
     [row_bytes, rows]: [usize; 2],
 ) -> Vec<u8> {
     let mut header = FitsHeader::default();
@@ -73,7 +73,7 @@ fn table_header<R>(
         if !meaning.unit.is_empty() {
             header.text(&format!("TUNIT{number}"), meaning.unit, "");
         }
-        if matches!(format, Format::Integer) {
+        if matches!(format, ColumnFormat::Integer) {
             header.integer(&format!("TNULL{number}"), NO_INTEGER, "");
         }
         if !meaning.ucd.is_empty() {
@@ -84,7 +84,7 @@ fn table_header<R>(
 }
 
 /// How the values of a column are stored.
-enum Format {
+enum ColumnFormat {
     Integer,
     Number,
     Bool,
@@ -92,7 +92,7 @@ enum Format {
     Text(usize),
 }
 
-impl Format {
+impl ColumnFormat {
     fn of(empty: &FieldValue, width: usize) -> Self {
         match empty {
             FieldValue::Integer(_) => Self::Integer,

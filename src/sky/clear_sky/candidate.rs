@@ -2,7 +2,7 @@
 
 use super::relation::{Unknowns, row_of};
 use crate::base::coords::{Icrs, UnitVector};
-use crate::photometry::Measured;
+use crate::photometry::MeasuredMagnitude;
 use crate::sky::neighbor::neighbor;
 use crate::sky::stars::SkyStar;
 
@@ -11,7 +11,7 @@ use crate::sky::stars::SkyStar;
 const AIR_SIGMA_MAG: f64 = 0.005;
 
 /// A star by which it may be measured.
-pub(super) struct Candidate {
+pub(super) struct ClearSkyStar {
     pub row: Unknowns,
     /// V magnitude less the instrumental one.
     pub offset_mag: f64,
@@ -24,7 +24,7 @@ pub(super) struct Candidate {
     pub neighbor: Option<usize>,
 }
 
-impl Candidate {
+impl ClearSkyStar {
     /// Those among `stars`, of which V magnitudes are about `mean_vmag`.
     pub fn all_of(stars: &[SkyStar], mean_vmag: f64) -> Vec<Self> {
         let of = |star| Self::of(star, mean_vmag);
@@ -38,7 +38,7 @@ impl Candidate {
     }
 
     fn of(star: &SkyStar, mean_vmag: f64) -> Option<Self> {
-        let Measured {
+        let MeasuredMagnitude {
             instrumental_mag,
             sigma_mag,
         } = star.measured?;

@@ -1,7 +1,7 @@
 //! The relation for the stars in clear air, fitted among stars that clouds dim.
 
-use super::candidate::Candidate;
-use super::mixture::{CloudMix, Kind, StarErrors, clear_stars, errors_of, least_clear};
+use super::candidate::ClearSkyStar;
+use super::mixture::{CloudMix, StarErrors, StarMembership, clear_stars, errors_of, least_clear};
 use super::relation::{UNKNOWNS, Unknowns, experience};
 use crate::base::least_squares::LinearFit;
 use crate::base::statistics::Estimate;
@@ -19,14 +19,14 @@ const ABOVE: [f64; 4] = [0.1, 0.3, 0.5, 0.7];
 
 /// A fit to stars in clear air.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fit {
+pub(super) struct RelationFit {
     pub unknowns: Unknowns,
     pub covariance: Covariance,
 }
 
 /// A fit to stars in clear air, among others.
 pub(super) struct ClearFit {
-    pub fit: Fit,
+    pub fit: RelationFit,
     pub errors: StarErrors,
     /// Number of stars in clear air.
     pub stars: usize,
@@ -35,13 +35,13 @@ pub(super) struct ClearFit {
 
 impl ClearFit {
     /// The fit to the stars that are not dimmed. `None` if they are too few.
-    pub fn of(candidates: &[Candidate], is_flat: bool) -> Option<Self> {
+    pub fn of(candidates: &[ClearSkyStar], is_flat: bool) -> Option<Self> {
         let fitted = |largest_mag| Self::to_brighter(candidates, largest_mag, is_flat, &ABOVE);
         LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)
     }
 
     /// The fit to all of them, from fewer heights.
-    pub fn to_all(candidates: &[Candidate], is_flat: bool) -> Option<Self> {
+    pub fn to_all(candidates: &[ClearSkyStar], is_flat: bool) -> Option<Self> {
         let heights = [ABOVE[0], ABOVE[2]];
         Self::to_brighter(candidates, f64::INFINITY, is_flat, &heights)
     }
@@ -51,14 +51,14 @@ impl ClearFit {
     /// Clear stars and those behind clouds are told apart by expectation and maximization, from several
     /// heights of the relation: the likeliest one counts.
     fn to_brighter(
-        candidates: &[Candidate],
+        candidates: &[ClearSkyStar],
         largest_mag: f64,
         is_flat: bool,
         heights: &[f64],
     ) -> Option<Self> {
-        let highest = Fit::first(candidates, largest_mag, is_flat, ABOVE[0])?;
-        let counting = |star: &&Candidate| star.counts(&highest.unknowns, largest_mag);
-        let common: Vec<&Candidate> = candidates.iter().filter(counting).collect();
+        let highest = RelationFit::first(candidates, largest_mag, is_flat, ABOVE[0])?;
+        let counting = |star: &&ClearSkyStar| star.counts(&highest.unknowns, largest_mag);
+        let common: Vec<&ClearSkyStar> = candidates.iter().filter(counting).collect();
         let from = |above: &f64| Self::from(candidates, largest_mag, is_flat, *above);
         let fits = heights.iter().filter_map(from);
         let rated = fits.map(|fit| (fit.ln_posterior(&common, is_flat), fit));
@@ -67,11 +67,16 @@ impl ClearFit {
     }
 
     /// From the height of the relation at which this share of the stars is above it.
-    fn from(candidates: &[Candidate], largest_mag: f64, is_flat: bool, above: f64) -> Option<Self> {
+    fn from(
+        candidates: &[ClearSkyStar],
+        largest_mag: f64,
+        is_flat: bool,
+        above: f64,
+    ) -> Option<Self> {
         const ROUNDS: usize = 50;
         const SETTLED_MAG: f64 = 1e-4;
         let mut fitted = Self {
-            fit: Fit::first(candidates, largest_mag, is_flat, above)?,
+            fit: RelationFit::first(candidates, largest_mag, is_flat, above)?,
             errors: StarErrors {
                 scale: 1.0,
                 scatter_mag: 0.2,
@@ -84,14 +89,14 @@ impl ClearFit {
             let counting = candidates
                 .iter()
                 .filter(|star| star.counts(&fit.unknowns, largest_mag));
-            let stars: Vec<(&Candidate, Kind)> = counting
+            let stars: Vec<(&ClearSkyStar, StarMembership)> = counting
                 .map(|star| (star, star.kind(&fit.unknowns, errors, &fitted.clouds)))
                 .collect();
             let clear = clear_stars(&stars);
             if clear < least_clear(stars.len()) {
                 return None;
             }
-            let mut next = Fit::of(&stars, fit, errors, is_flat)?;
+            let mut next = RelationFit::of(&stars, fit, errors, is_flat)?;
             let next_errors = errors_of(&stars, candidates, &next.unknowns);
             let changed_mag = (next_errors.scatter_mag - errors.scatter_mag).abs();
             let moved_mag = (next.unknowns - fit.unknowns).amax();
@@ -110,8 +115,8 @@ impl ClearFit {
     }
 
     /// Logarithm of the likelihood of `stars` and of the unknowns by experience.
-    pub fn ln_posterior(&self, stars: &[&Candidate], is_flat: bool) -> f64 {
-        let of_star = |star: &&Candidate| {
+    pub fn ln_posterior(&self, stars: &[&ClearSkyStar], is_flat: bool) -> f64 {
+        let of_star = |star: &&ClearSkyStar| {
             let kind = star.kind(&self.fit.unknowns, &self.errors, &self.clouds);
             kind.ln_likelihood
         };
@@ -123,9 +128,9 @@ impl ClearFit {
     }
 }
 
-impl Fit {
+impl RelationFit {
     /// The relation of experience, so high that this share of the stars is above it.
-    fn first(stars: &[Candidate], largest_mag: f64, is_flat: bool, share: f64) -> Option<Self> {
+    fn first(stars: &[ClearSkyStar], largest_mag: f64, is_flat: bool, share: f64) -> Option<Self> {
         let mut fit = Self {
             unknowns: Unknowns::from(experience(is_flat).map(|known| known.value)),
             covariance: Covariance::zeros(),
@@ -141,7 +146,7 @@ impl Fit {
 
     /// The fit to `stars`, by what they are and the errors that they have by the fit `before`.
     fn of(
-        stars: &[(&Candidate, Kind)],
+        stars: &[(&ClearSkyStar, StarMembership)],
         before: &Self,
         errors: &StarErrors,
         is_flat: bool,
@@ -174,8 +179,12 @@ impl Fit {
     }
 
     /// Mean of the squared residuals of its stars over their variances, for the number of unknowns.
-    fn scatter_over_errors(&self, stars: &[(&Candidate, Kind)], errors: &StarErrors) -> f64 {
-        let square = |(star, kind): &(&Candidate, Kind)| {
+    fn scatter_over_errors(
+        &self,
+        stars: &[(&ClearSkyStar, StarMembership)],
+        errors: &StarErrors,
+    ) -> f64 {
+        let square = |(star, kind): &(&ClearSkyStar, StarMembership)| {
             let sigma_mag = errors.of(star.expected_sigma_mag(&self.unknowns));
             kind.clear * (star.residual_mag(&self.unknowns) / sigma_mag).powi(2)
         };
@@ -207,7 +216,7 @@ mod tests {
         let candidate = |index: usize| {
             let noise_mag = SIGMA_MAG * random.sample::<f64, _>(StandardNormal);
             let off_mag = random.random_range(-2.0..2.0);
-            Candidate {
+            ClearSkyStar {
                 row: Unknowns::from(row_of(None, 0.0, Some(0.6), off_mag)),
                 offset_mag: ZERO_POINT_MAG - cloud_mag(index) + noise_mag,
                 sigma_mag: SIGMA_MAG,
@@ -216,7 +225,7 @@ mod tests {
                 neighbor: index.is_multiple_of(2).then_some(index + 1),
             }
         };
-        let candidates: Vec<Candidate> = (0..200).map(candidate).collect();
+        let candidates: Vec<ClearSkyStar> = (0..200).map(candidate).collect();
         ClearFit::of(&candidates, true).expect("there are enough stars")
     }
 

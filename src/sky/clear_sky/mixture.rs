@@ -1,6 +1,6 @@
 //! Stars in clear air, among others: clouds dim stars by some extinctions, and a few may be anything.
 
-use super::candidate::Candidate;
+use super::candidate::ClearSkyStar;
 use super::relation::Unknowns;
 use crate::base::statistics::{SIGMA_PER_MAD, median, median_of, normal_density};
 
@@ -64,7 +64,7 @@ impl CloudMix {
     }
 
     /// By what `stars` are, and what is usual.
-    pub fn of(stars: &[(&Candidate, Kind)]) -> Self {
+    pub fn of(stars: &[(&ClearSkyStar, StarMembership)]) -> Self {
         /// Stars in clear air, and behind clouds, which a frame has beforehand.
         const BEFOREHAND: f64 = 0.5;
         let cloudy = |part: usize| stars.iter().map(|(_, kind)| kind.clouds[part]).sum::<f64>();
@@ -81,7 +81,7 @@ impl CloudMix {
 
 /// What a star is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kind {
+pub(super) struct StarMembership {
     /// Probability that it is in clear air, and that it is behind each part of the clouds.
     pub clear: f64,
     pub clouds: [f64; PARTS],
@@ -89,9 +89,14 @@ pub(super) struct Kind {
     pub ln_likelihood: f64,
 }
 
-impl Candidate {
+impl ClearSkyStar {
     /// What it is by a fit, and by what clouds there are.
-    pub fn kind(&self, unknowns: &Unknowns, errors: &StarErrors, clouds: &CloudMix) -> Kind {
+    pub fn kind(
+        &self,
+        unknowns: &Unknowns,
+        errors: &StarErrors,
+        clouds: &CloudMix,
+    ) -> StarMembership {
         /// Share of stars of which nothing is known: variable ones, wrong names.
         const UNTRUE: f64 = 0.02;
         /// Their magnitudes are anything within this range.
@@ -107,7 +112,7 @@ impl Candidate {
         let parts: [f64; PARTS] =
             std::array::from_fn(|part| (1.0 - UNTRUE) * clouds.clouded * of_part(part));
         let all = clear + parts.iter().sum::<f64>() + UNTRUE / UNTRUE_RANGE_MAG;
-        Kind {
+        StarMembership {
             clear: clear / all,
             clouds: parts.map(|part| part / all),
             ln_likelihood: libm::log(all),
@@ -121,15 +126,15 @@ pub(super) fn least_clear(stars: usize) -> f64 {
 }
 
 /// Number of stars in clear air.
-pub(super) fn clear_stars(stars: &[(&Candidate, Kind)]) -> f64 {
+pub(super) fn clear_stars(stars: &[(&ClearSkyStar, StarMembership)]) -> f64 {
     stars.iter().map(|(_, kind)| kind.clear).sum()
 }
 
 /// The errors of stars. Only what is above the relation is noise alone. What neighbors have in common is none, but
 /// clouds.
 pub(super) fn errors_of(
-    stars: &[(&Candidate, Kind)],
-    candidates: &[Candidate],
+    stars: &[(&ClearSkyStar, StarMembership)],
+    candidates: &[ClearSkyStar],
     unknowns: &Unknowns,
 ) -> StarErrors {
     /// Least scatter of a star: its catalogue magnitude and its pixels.

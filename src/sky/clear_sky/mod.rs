@@ -16,10 +16,10 @@ mod relation;
 
 use super::stars::SkyStar;
 use crate::base::statistics::Estimate;
-use crate::photometry::Measured;
+use crate::photometry::MeasuredMagnitude;
 use crate::photometry::zero_point::REFERENCE_BV_MAG;
-use candidate::Candidate;
-use fit::{ClearFit, Fit};
+use candidate::ClearSkyStar;
+use fit::{ClearFit, RelationFit};
 use mixture::StarErrors;
 use relation::{
     COLOR, COLOR_CURVE, EXTINCTION, SLOPE, UNKNOWNS, USUAL_EXTINCTION, Unknowns, VIGNETTING, row_of,
@@ -56,7 +56,7 @@ pub struct ClearSky {
     pub has_horizon: bool,
     /// The errors of all stars.
     errors: StarErrors,
-    fit: Fit,
+    fit: RelationFit,
     /// V̄.
     mean_vmag: f64,
     /// What the zero point for the sky's light may be off beyond it.
@@ -69,7 +69,7 @@ impl ClearSky {
         let measured = || stars.iter().filter(|star| star.measured.is_some());
         let sum: f64 = measured().map(|star| star.v_mag).sum();
         let mean_vmag = sum / measured().count().max(1) as f64;
-        let candidates = Candidate::all_of(stars, mean_vmag);
+        let candidates = ClearSkyStar::all_of(stars, mean_vmag);
         let has_horizon = stars.iter().any(|star| star.airmass.is_some());
         let fitted = ClearFit::of(&candidates, is_flat)?;
         Some(Self::by(&fitted, has_horizon, mean_vmag))
@@ -78,13 +78,13 @@ impl ClearSky {
     /// The same by `stars` whose magnitudes are those of light, all of which count, and the logarithm of its
     /// likelihood.
     pub(super) fn of_light(stars: &[SkyStar], is_flat: bool) -> Option<(Self, f64)> {
-        let mut candidates = Candidate::all_of(stars, 0.0);
+        let mut candidates = ClearSkyStar::all_of(stars, 0.0);
         for candidate in &mut candidates {
             candidate.row[SLOPE] = 0.0;
         }
         let has_horizon = stars.iter().any(|star| star.airmass.is_some());
         let fitted = ClearFit::to_all(&candidates, is_flat)?;
-        let all: Vec<&Candidate> = candidates.iter().collect();
+        let all: Vec<&ClearSkyStar> = candidates.iter().collect();
         let clear_sky = Self::by(&fitted, has_horizon, 0.0);
         Some((clear_sky, fitted.ln_posterior(&all, is_flat)))
     }
@@ -132,7 +132,7 @@ impl ClearSky {
 
     /// By how many magnitudes a star is dimmer than in clear air, and the standard error of that.
     pub(super) fn dimmed_by(&self, star: &SkyStar) -> Option<Estimate> {
-        let Measured {
+        let MeasuredMagnitude {
             instrumental_mag,
             sigma_mag,
         } = star.measured?;

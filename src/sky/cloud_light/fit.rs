@@ -1,7 +1,7 @@
 //! The light of the clear sky and of clouds, and which cells have it.
 
 use super::lit_cell::{Hidden, LitCell, STEPS, share_of};
-use super::per_share::{CloudyCell, PerShare};
+use super::per_share::{CloudLightRatio, CloudyCell};
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -14,7 +14,7 @@ const UNTRUE_RANGE: f64 = 2.0;
 const LEAST_SIGMA: f64 = 0.005;
 
 /// The light of the clear sky and of clouds.
-pub(super) struct Fit {
+pub(super) struct CloudLightFit {
     /// Coefficients of the terms of the clear sky.
     clear: DVector<f64>,
     /// Light that clouds add where they take all light of stars, over that of the clear sky.
@@ -29,7 +29,7 @@ pub(super) struct Fit {
 
 /// What is expected of a cell.
 #[derive(Debug, Clone, Copy, Default)]
-struct Expected {
+struct ExpectedCloud {
     /// Share of a star's light that clouds take, and its variance.
     share: f64,
     share_variance: f64,
@@ -39,7 +39,7 @@ struct Expected {
     cloud: f64,
 }
 
-impl Fit {
+impl CloudLightFit {
     /// The fit to `cells`, whose light is scaled to a median of 1; `None` if they are too few.
     pub(super) fn of(cells: &mut [LitCell], clouded: f64) -> Option<Self> {
         /// Least number of cells for each unknown.
@@ -111,7 +111,7 @@ impl Fit {
             let share = self.excess(lit) / self.of_cloud;
             (share > SIGMAS * sigma).then_some(CloudyCell { share, sigma, lit })
         });
-        let PerShare { ln_ratio, sigma } = PerShare::of(&cloudy.collect::<Vec<_>>());
+        let CloudLightRatio { ln_ratio, sigma } = CloudLightRatio::of(&cloudy.collect::<Vec<_>>());
         self.of_cloud *= libm::exp(ln_ratio);
         self.of_cloud_sigma = libm::hypot(sigma, DIFFERS);
     }
@@ -123,7 +123,7 @@ impl Fit {
 
     /// What the stars alone tell of a cell. Light goes with the share that they expect; that this is uncertain
     /// makes it scatter.
-    fn expected_by_stars(&self, lit: &LitCell) -> Expected {
+    fn expected_by_stars(&self, lit: &LitCell) -> ExpectedCloud {
         let [mut all, mut first] = [0.0; 2];
         for step in 0..=STEPS {
             let probability = lit.hidden.mixed(step, self.clouded);
@@ -136,15 +136,15 @@ impl Fit {
         } else {
             1.0
         };
-        Expected {
+        ExpectedCloud {
             share,
             weight,
-            ..Expected::default()
+            ..ExpectedCloud::default()
         }
     }
 
     /// What stars and light tell of a cell.
-    fn expected(&self, lit: &LitCell) -> Expected {
+    fn expected(&self, lit: &LitCell) -> ExpectedCloud {
         let excess = self.excess(lit);
         let [mut all, mut cloud, mut told, mut first, mut second] = [0.0; 5];
         for step in 0..=STEPS {
@@ -160,13 +160,13 @@ impl Fit {
         }
         let cloud = cloud / all;
         if told < f64::EPSILON * all {
-            return Expected {
+            return ExpectedCloud {
                 cloud,
-                ..Expected::default()
+                ..ExpectedCloud::default()
             };
         }
         let share = first / told;
-        Expected {
+        ExpectedCloud {
             share,
             share_variance: (second / told - share * share).max(0.0),
             weight: told / all,
@@ -175,7 +175,7 @@ impl Fit {
     }
 
     /// The fit to the light of the cells, relative to that of the clear sky so far.
-    fn next(&self, cells: &[LitCell], expected: &[Expected]) -> Option<Self> {
+    fn next(&self, cells: &[LitCell], expected: &[ExpectedCloud]) -> Option<Self> {
         /// Cells that are clear, and that are not, which a sky has beforehand.
         const BEFOREHAND: f64 = 0.5;
         let terms = self.clear.len();
@@ -205,7 +205,7 @@ impl Fit {
             sigma: LEAST_SIGMA,
             clouded: (BEFOREHAND + cloudy) / (2.0 * BEFOREHAND + count),
         };
-        let square = |(lit, expected): (&LitCell, &Expected)| {
+        let square = |(lit, expected): (&LitCell, &ExpectedCloud)| {
             let off = next.excess(lit) - next.of_cloud * expected.share;
             expected.weight * (off * off + next.of_cloud.powi(2) * expected.share_variance)
         };

@@ -18,7 +18,7 @@ mod per_share;
 mod terms;
 
 use super::grid::CELLS_OF_A_STAR;
-use fit::Fit;
+use fit::CloudLightFit;
 pub(super) use lit_cell::{Hidden, LitCell, for_each_share};
 pub(super) use terms::terms;
 
@@ -26,7 +26,7 @@ pub(super) use terms::terms;
 pub(super) struct CloudLight {
     /// Light of each cell beyond that of the clear sky, over it.
     excess: Vec<Option<f64>>,
-    fit: Fit,
+    fit: CloudLightFit,
 }
 
 impl CloudLight {
@@ -35,7 +35,7 @@ impl CloudLight {
     pub(super) fn of(mut cells: Vec<LitCell>, before: &Hidden, clouded: f64) -> Option<Self> {
         /// What chance may give of the gain of [`Fit::gains`].
         const LEAST_GAIN: f64 = 6.0;
-        let mut fit = Fit::of(&mut cells, clouded)?;
+        let mut fit = CloudLightFit::of(&mut cells, clouded)?;
         let gains = cells
             .iter()
             .map(|lit| fit.gains(lit, before, clouded))

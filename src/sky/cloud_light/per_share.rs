@@ -12,7 +12,7 @@ const UNTRUE: f64 = 0.02;
 
 /// Light of clouds for the share of a star's light that they take, over what was assumed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PerShare {
+pub(super) struct CloudLightRatio {
     /// The logarithm of the ratio.
     pub ln_ratio: f64,
     /// Its standard error.
@@ -28,7 +28,7 @@ pub(super) struct CloudyCell<'a> {
     pub lit: &'a LitCell,
 }
 
-impl PerShare {
+impl CloudLightRatio {
     /// By the stars of `cells`.
     pub(super) fn of(cells: &[CloudyCell]) -> Self {
         /// Standard deviation of the logarithm beforehand.
@@ -109,7 +109,7 @@ mod tests {
                 sigma: 0.02,
                 lit: &lit,
             });
-            PerShare::of(&cells.collect::<Vec<_>>())
+            CloudLightRatio::of(&cells.collect::<Vec<_>>())
         };
         // They take half of what their light was thought to tell: it is twice as much for what they take.
         let well_told = found(0.05, 40);

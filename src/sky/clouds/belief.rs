@@ -6,7 +6,7 @@
 //! and how thick its clouds are on average, is told by all cells together.
 
 use super::cases::{
-    BROKEN_STEP_MAG, CASES, CLEAR_MAG, Case, Cases, KINDS, STEP_MAG, STEPS, case, mean_mag,
+    BROKEN_STEP_MAG, CASES, CLEAR_MAG, Cases, CloudCase, KINDS, STEP_MAG, STEPS, case, mean_mag,
 };
 use crate::base::statistics::Estimate;
 use crate::sky::cloud_light::Hidden;
@@ -26,7 +26,7 @@ const MOST_ODDS: f64 = 1000.0;
 
 /// A cell of which stars tell.
 #[derive(Debug, Clone)]
-pub(super) struct Told {
+pub(super) struct CellLikelihoods {
     /// The cell.
     pub cell: usize,
     /// Solid angle of its sky.
@@ -35,7 +35,7 @@ pub(super) struct Told {
     likelihoods: Cases,
 }
 
-impl Told {
+impl CellLikelihoods {
     /// A cell by the logarithms of the likelihoods of the cases.
     pub(super) fn new(cell: usize, solid_angle_sr: f64, ln_likelihoods: &Cases) -> Self {
         let largest = ln_likelihoods
@@ -75,10 +75,10 @@ impl Told {
 
 /// What is believed of a sky.
 #[derive(Debug, Clone)]
-pub(super) struct Belief {
-    priors: Priors,
+pub(super) struct CloudPosterior {
+    priors: CasePriors,
     /// Those where clouds are smooth, and where they are broken.
-    limiting: [Priors; 2],
+    limiting: [CasePriors; 2],
     /// Of each cell.
     evidence: Vec<Evidence>,
     /// Part of the sky that is not clear.
@@ -87,9 +87,9 @@ pub(super) struct Belief {
     sigma: f64,
 }
 
-impl Belief {
+impl CloudPosterior {
     /// With the mean extinction of clouds that is likeliest.
-    pub(super) fn of(told: &[Told]) -> Self {
+    pub(super) fn of(told: &[CellLikelihoods]) -> Self {
         let beliefs = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(told, mean_mag));
         let [first, rest @ ..] = beliefs;
         let likelier = |best: Self, other: Self| {
@@ -103,11 +103,11 @@ impl Belief {
     }
 
     /// The part that is clouded is the one for which what the cells show is most probable.
-    fn with(told: &[Told], mean_cloud_mag: f64) -> Self {
+    fn with(told: &[CellLikelihoods], mean_cloud_mag: f64) -> Self {
         const STEPS: usize = 200;
         /// Cells that are clear, and that are not, which the sky has beforehand.
         const BEFOREHAND: f64 = 0.5;
-        let priors = Priors::new(mean_cloud_mag, &USUAL);
+        let priors = CasePriors::new(mean_cloud_mag, &USUAL);
         let evidence: Vec<Evidence> = told
             .iter()
             .map(|told| priors.evidence(told, CLEAR_MAG))
@@ -130,7 +130,7 @@ impl Belief {
         Self {
             priors,
             sigma: (cells * information).sqrt().recip().min(0.5),
-            limiting: [SMOOTH, BROKEN].map(|covers| Priors::new(mean_cloud_mag, &covers)),
+            limiting: [SMOOTH, BROKEN].map(|covers| CasePriors::new(mean_cloud_mag, &covers)),
             evidence,
             clouded,
         }
@@ -142,7 +142,7 @@ impl Belief {
     }
 
     /// The share of a star's light that clouds take in a cell; `hidden_shares` are those of the cases.
-    pub(super) fn hidden(&self, told: &Told, hidden_shares: &Cases) -> Hidden {
+    pub(super) fn hidden(&self, told: &CellLikelihoods, hidden_shares: &Cases) -> Hidden {
         self.priors.hidden(&told.likelihoods, hidden_shares)
     }
 
@@ -159,8 +159,8 @@ impl Belief {
 
     /// The probability of a cell that it is clear where clouds are smooth and thicker by `doubt_mag`, and where they
     /// are broken and thinner by that.
-    pub(super) fn clear_band(&self, told: &Told, doubt_mag: f64) -> [f64; 2] {
-        let clear = |priors: &Priors, clear_mag: f64| {
+    pub(super) fn clear_band(&self, told: &CellLikelihoods, doubt_mag: f64) -> [f64; 2] {
+        let clear = |priors: &CasePriors, clear_mag: f64| {
             let (clear, _) = priors.evidence(told, clear_mag).posterior(self.clouded);
             clear
         };
@@ -175,8 +175,8 @@ impl Belief {
     /// their bands.
     pub(super) fn share(
         &self,
-        told: &[Told],
-        clear: impl Fn(&Told) -> [f64; 3],
+        told: &[CellLikelihoods],
+        clear: impl Fn(&CellLikelihoods) -> [f64; 3],
     ) -> Option<Estimate> {
         /// The ends of all bands together, over the standard error that they are.
         const BAND_SIGMAS: f64 = 2.0;
@@ -197,12 +197,12 @@ impl Belief {
 
 /// Probabilities of the cases beforehand, in the clear part of the sky and in the other.
 #[derive(Debug, Clone)]
-struct Priors {
+struct CasePriors {
     clear: Cases,
     cloud: Cases,
 }
 
-impl Priors {
+impl CasePriors {
     /// Those of clouds with this mean extinction, and covers of cells.
     fn new(mean_cloud_mag: f64, covers: &[f64; KINDS]) -> Self {
         let of_clear = |case: usize| match case {
@@ -210,7 +210,7 @@ impl Priors {
             _ => 0.0,
         };
         let of_cloud = |number: usize| {
-            let Case { kind, mag, .. } = case(number);
+            let CloudCase { kind, mag, .. } = case(number);
             let step_mag = [STEP_MAG, BROKEN_STEP_MAG, BROKEN_STEP_MAG][kind];
             covers[kind] * step_mag * libm::exp(-mag / mean_cloud_mag)
         };
@@ -225,9 +225,9 @@ impl Priors {
     }
 
     /// What is told of a cell, where less than `clear_mag` counts as clear.
-    fn evidence(&self, told: &Told, clear_mag: f64) -> Evidence {
+    fn evidence(&self, told: &CellLikelihoods, clear_mag: f64) -> Evidence {
         let sums = |prior: &Cases| {
-            let mut sums = Sums::default();
+            let mut sums = CaseSums::default();
             for (case, (likelihood, prior)) in told.likelihoods.iter().zip(prior).enumerate() {
                 let weight = prior * likelihood;
                 sums.all += weight;
@@ -259,13 +259,13 @@ impl Priors {
 /// What is told of a cell: sums over the cases, if it is part of the clear sky, and if it is not.
 #[derive(Debug, Clone, Copy)]
 struct Evidence {
-    clear: Sums,
-    cloud: Sums,
+    clear: CaseSums,
+    cloud: CaseSums,
 }
 
 /// Sums of likelihoods over the cases.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct CaseSums {
     all: f64,
     first: f64,
     second: f64,
@@ -281,8 +281,9 @@ impl Evidence {
     /// The probability that the sky is clear, and the extinction, where a part `clouded` of the sky is not
     /// clear.
     fn posterior(&self, clouded: f64) -> (f64, Estimate) {
-        let mean =
-            |of: fn(&Sums) -> f64| (1.0 - clouded) * of(&self.clear) + clouded * of(&self.cloud);
+        let mean = |of: fn(&CaseSums) -> f64| {
+            (1.0 - clouded) * of(&self.clear) + clouded * of(&self.cloud)
+        };
         let all = self.mixed(clouded);
         let first = mean(|sums| sums.first) / all;
         let second = mean(|sums| sums.second) / all;
@@ -294,7 +295,7 @@ impl Evidence {
     }
 }
 
-impl Sums {
+impl CaseSums {
     /// The same with a sum that is not below `least`.
     fn at_least(self, least: f64) -> Self {
         if self.all >= least {
@@ -315,15 +316,15 @@ mod tests {
     use super::*;
 
     /// A cell in which extinctions about `cloud_mag` are as likely as `odds` to those about zero.
-    fn told(cell: usize, cloud_mag: f64, odds: f64) -> Told {
+    fn told(cell: usize, cloud_mag: f64, odds: f64) -> CellLikelihoods {
         let logs = std::array::from_fn(|case| {
             let about = |mag: f64| libm::exp(-0.5 * ((mean_mag(case) - mag) / 0.1).powi(2));
             libm::log(about(0.0) + odds * about(cloud_mag) + 1e-9)
         });
-        Told::new(cell, 0.01, &logs)
+        CellLikelihoods::new(cell, 0.01, &logs)
     }
 
-    fn share_of(belief: &Belief, all: &[Told]) -> Option<Estimate> {
+    fn share_of(belief: &CloudPosterior, all: &[CellLikelihoods]) -> Option<Estimate> {
         let clear: Vec<f64> = belief.cells().map(|(clear, _)| clear).collect();
         let bands = all.iter().map(|told| belief.clear_band(told, 0.05));
         let bands: Vec<[f64; 2]> = bands.collect();
@@ -338,10 +339,10 @@ mod tests {
 
     #[test]
     fn broken_clouds_may_leave_a_cell_clear_that_smooth_ones_do_not() {
-        let cells: Vec<Told> = (0..100)
+        let cells: Vec<CellLikelihoods> = (0..100)
             .map(|cell| told(cell, 0.3, if cell < 50 { 1e-3 } else { 1e4 }))
             .collect();
-        let belief = Belief::of(&cells);
+        let belief = CloudPosterior::of(&cells);
         for (told, (clear, _)) in cells.iter().zip(belief.cells()) {
             let [low, high] = belief.clear_band(told, 0.05);
             assert!(low <= clear && clear <= high, "{low} {clear} {high}");
@@ -352,37 +353,37 @@ mod tests {
 
     #[test]
     fn all_cells_together_tell_how_much_is_clear() {
-        let cells = |clear: usize, cloudy: usize| -> Vec<Told> {
+        let cells = |clear: usize, cloudy: usize| -> Vec<CellLikelihoods> {
             let odds = |cell: usize| if cell < clear { 1e-3 } else { 1e4 };
             (0..clear + cloudy)
                 .map(|cell| told(cell, 1.0, odds(cell)))
                 .collect()
         };
         let mostly_clear = cells(90, 10);
-        let belief = Belief::of(&mostly_clear);
+        let belief = CloudPosterior::of(&mostly_clear);
         let share = share_of(&belief, &mostly_clear).unwrap();
         assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
         assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
         // The same cell is more likely clear where most of the sky is.
         let doubtful = belief.priors.evidence(&told(0, 1.0, 10.0), CLEAR_MAG);
         let (clear, _) = doubtful.posterior(belief.clouded);
-        let (less, _) = doubtful.posterior(Belief::of(&cells(10, 90)).clouded);
+        let (less, _) = doubtful.posterior(CloudPosterior::of(&cells(10, 90)).clouded);
         assert!(clear > less + 0.3, "{clear} {less}");
-        assert_eq!(share_of(&Belief::of(&[]), &[]), None);
+        assert_eq!(share_of(&CloudPosterior::of(&[]), &[]), None);
     }
 
     #[test]
     fn thin_clouds_are_likelier_where_all_clouds_are_thin() {
-        let cells = |cloud_mag: f64| -> Vec<Told> {
+        let cells = |cloud_mag: f64| -> Vec<CellLikelihoods> {
             let odds = |cell: usize| if cell.is_multiple_of(3) { 20.0 } else { 0.05 };
             (0..300)
                 .map(|cell| told(cell, cloud_mag, odds(cell)))
                 .collect()
         };
         let thin = cells(0.4);
-        let share = share_of(&Belief::of(&thin), &thin).unwrap();
+        let share = share_of(&CloudPosterior::of(&thin), &thin).unwrap();
         assert!((share.value - 0.33).abs() < 0.1, "{share:?}");
-        let usual = Belief::with(&thin, 1.0);
+        let usual = CloudPosterior::with(&thin, 1.0);
         assert!(share_of(&usual, &thin).unwrap().value < share.value);
     }
 }

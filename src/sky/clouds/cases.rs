@@ -23,7 +23,7 @@ pub(super) type Cases = [f64; CASES];
 
 /// A case.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Case {
+pub(super) struct CloudCase {
     /// The kind of its cover.
     pub kind: usize,
     /// Part of the cell that clouds cover.
@@ -33,14 +33,14 @@ pub(super) struct Case {
 }
 
 /// The case with this number.
-pub(super) fn case(number: usize) -> Case {
+pub(super) fn case(number: usize) -> CloudCase {
     match number.checked_sub(STEPS) {
-        None => Case {
+        None => CloudCase {
             kind: 0,
             cover: 1.0,
             mag: number as f64 * STEP_MAG,
         },
-        Some(broken) => Case {
+        Some(broken) => CloudCase {
             kind: 1 + broken / BROKEN_STEPS,
             cover: COVERS[broken / BROKEN_STEPS],
             mag: (broken % BROKEN_STEPS + 1) as f64 * BROKEN_STEP_MAG,
@@ -50,14 +50,14 @@ pub(super) fn case(number: usize) -> Case {
 
 /// Mean extinction of a cell in a case.
 pub(super) fn mean_mag(number: usize) -> f64 {
-    let Case { cover, mag, .. } = case(number);
+    let CloudCase { cover, mag, .. } = case(number);
     cover * mag
 }
 
 /// Mean share of a star's light that clouds take in each case.
 pub(super) fn hidden_shares() -> Cases {
     std::array::from_fn(|number| {
-        let Case { cover, mag, .. } = case(number);
+        let CloudCase { cover, mag, .. } = case(number);
         cover * (1.0 - libm::pow(10.0, -0.4 * mag))
     })
 }

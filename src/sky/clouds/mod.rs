@@ -10,14 +10,14 @@ mod belief;
 mod cases;
 mod texture;
 
-use super::brightness::Levels;
+use super::brightness::SkyLevels;
 use super::cloud_light::{CloudLight, Hidden, LitCell, for_each_share, terms};
 use super::relative_limit::RelativeLimit;
-use super::witnesses::{Sky, Witness};
+use super::witnesses::{CellStar, CloudInputs};
 use crate::base::statistics::Estimate;
-use belief::{Belief, CLEAR_SIGMA_MAG, Told};
+use belief::{CLEAR_SIGMA_MAG, CellLikelihoods, CloudPosterior};
 pub use cases::CLEAR_MAG;
-use cases::{CASES, CLOUD_VARIATION, Case, Cases, STEP_MAG, STEPS, hidden_shares};
+use cases::{CASES, CLOUD_VARIATION, Cases, CloudCase, STEP_MAG, STEPS, hidden_shares};
 use texture::Texture;
 
 /// Share of stars whose brightness or presence tells nothing: variable stars, wrong names.
@@ -51,16 +51,16 @@ struct Around {
 }
 
 /// Clouds in all cells.
-pub(super) struct Clouds {
+pub(super) struct CloudMap {
     /// Each cell.
     pub cells: Vec<CellClouds>,
     /// Share of the sky that is behind clouds.
     pub share: Option<Estimate>,
 }
 
-impl Sky<'_> {
+impl CloudInputs<'_> {
     /// Clouds in each cell.
-    pub(super) fn clouds(&self, witnesses: &[Witness], levels: &Levels) -> Clouds {
+    pub(super) fn clouds(&self, witnesses: &[CellStar], levels: &SkyLevels) -> CloudMap {
         let limit = if self.is_usual {
             Some(RelativeLimit::usual())
         } else {
@@ -79,10 +79,14 @@ impl Sky<'_> {
             let around = self.around(cell, stars, limit.as_ref(), clouds);
             if let Some(around) = around.filter(|_| solid_angle_sr > 0.0) {
                 stars_of[cell] = around.stars;
-                told.push(Told::new(cell, solid_angle_sr, &around.ln_likelihoods));
+                told.push(CellLikelihoods::new(
+                    cell,
+                    solid_angle_sr,
+                    &around.ln_likelihoods,
+                ));
             }
         }
-        let mut belief = Belief::of(&told);
+        let mut belief = CloudPosterior::of(&told);
         let shares = hidden_shares();
         let lit = told
             .iter()
@@ -93,7 +97,7 @@ impl Sky<'_> {
                 let cell = told.cell;
                 told.add(&shares, |share| light.likelihood(cell, share));
             }
-            belief = Belief::of(&told);
+            belief = CloudPosterior::of(&told);
         }
         for (told, (clear, extinction_mag)) in told.iter().zip(belief.cells()) {
             cells[told.cell].clear = Some(clear);
@@ -112,14 +116,14 @@ impl Sky<'_> {
             let [low, high] = belief.clear_band(told, libm::hypot(doubt_mag, CLEAR_SIGMA_MAG));
             clouds.clear_band = clouds.clear.map(|clear| [low.min(clear), high.max(clear)]);
         }
-        let bands = |told: &Told| {
+        let bands = |told: &CellLikelihoods| {
             let CellClouds {
                 clear, clear_band, ..
             } = cells[told.cell];
             let [low, high] = clear_band.unwrap_or([0.0, 1.0]);
             [low, clear.unwrap_or(0.5), high]
         };
-        Clouds {
+        CloudMap {
             share: belief.share(&told, bands),
             cells,
         }
@@ -132,7 +136,7 @@ impl Sky<'_> {
         cell: usize,
         cells: &[CellClouds],
         stars: f64,
-        levels: &Levels,
+        levels: &SkyLevels,
         texture: &Texture,
     ) -> f64 {
         /// How far around a cell its clouds are alike, in reaches of a cell.
@@ -152,7 +156,7 @@ impl Sky<'_> {
     fn around<'w>(
         &self,
         cell: usize,
-        stars: impl Iterator<Item = (&'w Witness<'w>, &'w Cases)>,
+        stars: impl Iterator<Item = (&'w CellStar<'w>, &'w Cases)>,
         limit: Option<&RelativeLimit>,
         clouds: &mut CellClouds,
     ) -> Option<Around> {
@@ -184,7 +188,7 @@ impl Sky<'_> {
     }
 
     /// A cell with its light.
-    fn lit(&self, told: &Told, levels: &Levels, hidden: Hidden) -> Option<LitCell> {
+    fn lit(&self, told: &CellLikelihoods, levels: &SkyLevels, hidden: Hidden) -> Option<LitCell> {
         let place = self.grid.pixel_of(told.cell)?;
         let direction = self.grid.direction_of(&place)?;
         let (camera, zenith) = (self.grid.camera(), self.frame.places.zenith());
@@ -198,10 +202,10 @@ impl Sky<'_> {
     }
 
     /// The logarithm of the likelihood of a star in each case.
-    fn ln_likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> Cases {
+    fn ln_likelihoods(&self, witness: &CellStar, limit: Option<&RelativeLimit>) -> Cases {
         let full = self.likelihoods(witness, limit);
         std::array::from_fn(|case| {
-            let Case { cover, mag, .. } = cases::case(case);
+            let CloudCase { cover, mag, .. } = cases::case(case);
             let behind = full[(mag / STEP_MAG).round() as usize];
             // The star is behind the clouds, or beside them.
             let likelihood = cover * behind + (1.0 - cover) * full[0];
@@ -210,7 +214,7 @@ impl Sky<'_> {
     }
 
     /// The likelihood of a star for each extinction.
-    fn likelihoods(&self, witness: &Witness, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
+    fn likelihoods(&self, witness: &CellStar, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
         let star = witness.star;
         let dimmed_by = self.clear_sky.dimmed_by(star);
         std::array::from_fn(|step| {

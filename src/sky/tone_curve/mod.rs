@@ -20,11 +20,11 @@ mod spot;
 
 pub use curve::CurveKind;
 
-use super::brightness::{Levels, SkyLight, ZenithSky};
+use super::brightness::{SkyLevels, SkyLight, ZenithSky};
 use super::clear_sky::ClearSky;
 use super::curve_evidence::CurveEvidence;
 use super::dark_level::DarkLevel;
-use super::picture::Picture;
+use super::picture::SkyPicture;
 use super::stars::SkyStar;
 use crate::base::statistics::{Estimate, even_part};
 use crate::model::sensitivity::SkyBrightness;
@@ -71,7 +71,7 @@ pub(super) struct Curved {
 
 impl Curved {
     /// That of levels that are proportional to light above a known one.
-    pub(super) fn of_levels(levels: &Levels, clear_sky: &ClearSky, dark: DarkLevel) -> Self {
+    pub(super) fn of_levels(levels: &SkyLevels, clear_sky: &ClearSky, dark: DarkLevel) -> Self {
         let cells = 0..levels.cells.len();
         Self {
             tone: None,
@@ -97,13 +97,13 @@ pub(super) struct CurvedFrame<'a, 'p> {
     /// The frame.
     pub frame: &'a IdentifiedFrame<'a>,
     /// Its pixels.
-    pub picture: &'a Picture<'a, 'p>,
+    pub picture: &'a SkyPicture<'a, 'p>,
     /// Its stars.
     pub stars: &'a [SkyStar],
     /// The clear sky by levels.
     pub clear_sky: &'a ClearSky,
     /// The sky's levels.
-    pub levels: &'a Levels,
+    pub levels: &'a SkyLevels,
 }
 
 impl CurvedFrame<'_, '_> {
@@ -224,8 +224,8 @@ impl CurvedFrame<'_, '_> {
     fn by(&self, curves: &[FittedCurve], black: &Black) -> Option<Curved> {
         let sky_adu = self.levels.median_adu()?;
         let chosen = sampled(curves);
-        let mut cells: Vec<Mean> = Vec::new();
-        let (mut zenith, mut exponent) = (Mean::default(), Mean::default());
+        let mut cells: Vec<CurveMean> = Vec::new();
+        let (mut zenith, mut exponent) = (CurveMean::default(), CurveMean::default());
         for (at, fitted) in chosen.iter().enumerate() {
             // Levels without light are even over all curves, and over each kind of them.
             let probability = even_part(at);
@@ -235,7 +235,7 @@ impl CurvedFrame<'_, '_> {
                 .levels
                 .in_units(|level_adu| curve.light(level_adu) - dark, &fitted.clear_sky);
             let (of_cells, of_zenith) = self.levels.brightness_of(&light, &fitted.clear_sky);
-            cells.resize(of_cells.len(), Mean::default());
+            cells.resize(of_cells.len(), CurveMean::default());
             for (mean, light) in cells.iter_mut().zip(&of_cells) {
                 mean.add_light(light.as_ref());
             }
@@ -245,7 +245,7 @@ impl CurvedFrame<'_, '_> {
                 sigma: 0.0,
             });
         }
-        let light = |mean: &Mean| mean.light(chosen.len());
+        let light = |mean: &CurveMean| mean.light(chosen.len());
         let cells: Vec<Option<SkyLight>> = cells.iter().map(light).collect();
         let zenith = light(&zenith).map(ZenithSky::of);
         let is_known = zenith.is_some() || cells.iter().any(Option::is_some);
@@ -306,7 +306,7 @@ fn likeliest_kind(curves: &[&FittedCurve]) -> (CurveKind, f64) {
 
 /// A mean over curves.
 #[derive(Debug, Clone, Copy, Default)]
-struct Mean {
+struct CurveMean {
     count: usize,
     sum: f64,
     /// Sums of squared values and of variances.
@@ -314,7 +314,7 @@ struct Mean {
     variances: f64,
 }
 
-impl Mean {
+impl CurveMean {
     fn add(&mut self, estimate: Estimate) {
         self.count += 1;
         self.sum += estimate.value;

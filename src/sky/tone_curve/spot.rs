@@ -7,7 +7,7 @@ use super::curve::ToneCurve;
 use crate::base::statistics::{clip, even_part, mean_and_squares, median_of, normal_quantile};
 use crate::detect::Detections;
 use crate::frame::Frame;
-use crate::photometry::{MAG_PER_RELATIVE, Measured, instrumental_mag};
+use crate::photometry::{MAG_PER_RELATIVE, MeasuredMagnitude, instrumental_mag};
 use crate::sky::stars::SkyStar;
 
 /// The pixels of a star and of the sky around it.
@@ -179,7 +179,7 @@ impl Spot {
         let added = self.deviate * (relative_by_levels.powi(2) - relative.powi(2)).sqrt();
         is_seen.then(|| LitSpot {
             star: SkyStar {
-                measured: Some(Measured {
+                measured: Some(MeasuredMagnitude {
                     instrumental_mag: instrumental_mag(light * self.flux_per_light)
                         + MAG_PER_RELATIVE * added,
                     sigma_mag: MAG_PER_RELATIVE * relative_by_levels,

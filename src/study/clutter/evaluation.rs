@@ -1,6 +1,6 @@
 //! Compares what was found in a frame with the truth.
 
-use super::frames::{FrameMaker, TrueSky};
+use super::frames::{FrameMaker, FrameTruth};
 use crate::base::coords::PixelPoint;
 use crate::identify::{Identification, StarMatch};
 use crate::model::simulate::{TrueStar, Truth};
@@ -11,7 +11,7 @@ use crate::study::validation::LightMap;
 
 /// The result of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameResult {
+pub struct ClutterFrameResult {
     /// Whether the pointing is right. A frame without sky has no right one.
     pub answer: Answer,
     /// Millions of pixels.
@@ -31,12 +31,12 @@ pub struct FrameResult {
 /// Compares `solution` with the truth of its frame.
 pub(super) fn evaluate(
     maker: &FrameMaker,
-    sky: Option<&TrueSky>,
+    sky: Option<&FrameTruth>,
     solution: &Solution,
-) -> FrameResult {
+) -> ClutterFrameResult {
     let found = solution.outcome.identification();
     let matches = found.map_or(&[][..], |found| &found.matches);
-    let truth = sky.map(|sky| ClutterSky::of(maker, &sky.truth));
+    let truth = sky.map(|sky| ClutterStars::of(maker, &sky.truth));
     let star_like = solution
         .sources
         .iter()
@@ -51,7 +51,7 @@ pub(super) fn evaluate(
             .as_ref()
             .is_none_or(|sky| !sky.is_there(named, source))
     };
-    FrameResult {
+    ClutterFrameResult {
         answer: answer(maker, sky, found),
         megapixels: (solution.width * solution.height) as f64 / 1e6,
         detected: star_like.clone().count(),
@@ -62,7 +62,7 @@ pub(super) fn evaluate(
     }
 }
 
-fn answer(maker: &FrameMaker, sky: Option<&TrueSky>, found: Option<&Identification>) -> Answer {
+fn answer(maker: &FrameMaker, sky: Option<&FrameTruth>, found: Option<&Identification>) -> Answer {
     match (found, sky) {
         (None, _) => Answer::None,
         (Some(_), None) => Answer::Wrong,
@@ -75,14 +75,14 @@ fn answer(maker: &FrameMaker, sky: Option<&TrueSky>, found: Option<&Identificati
 }
 
 /// The true stars of a frame.
-struct ClutterSky<'a> {
+struct ClutterStars<'a> {
     light: LightMap<'a>,
     limit_vmag: f64,
     /// Half of the length of a trail.
     half_trail_px: f64,
 }
 
-impl<'a> ClutterSky<'a> {
+impl<'a> ClutterStars<'a> {
     fn of(maker: &FrameMaker, truth: &'a Truth) -> Self {
         let [x, y] = truth.motion_px;
         Self {

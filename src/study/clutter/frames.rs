@@ -1,7 +1,7 @@
 //! Makes the frames of a study, each with its truth.
 
 use super::canvas::ClutterCanvas;
-use super::kind::Kind;
+use super::kind::ClutterKind;
 use super::{no_sky, recording, scenery};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::ephemeris::places::StarPlaces;
@@ -21,12 +21,12 @@ pub struct ClutteredFrame {
     /// The frame.
     pub frame: Frame<'static>,
     /// What is on it; `None` where it shows no sky.
-    pub sky: Option<TrueSky>,
+    pub sky: Option<FrameTruth>,
 }
 
 /// The sky on a frame.
 #[derive(Debug, Clone)]
-pub struct TrueSky {
+pub struct FrameTruth {
     /// Where the camera pointed.
     pub pointing: Pointing,
     /// The stars that nothing hides, without false ones.
@@ -35,7 +35,7 @@ pub struct TrueSky {
 
 /// Makes the frames of one kind.
 pub struct FrameMaker<'a> {
-    kind: Kind,
+    kind: ClutterKind,
     pub(super) scenario: Scenario,
     pub(super) simulator: Simulator<'a>,
     /// V magnitude at which half of the stars are detected, without clutter.
@@ -48,7 +48,7 @@ impl<'a> FrameMaker<'a> {
     /// # Errors
     /// [`StudyError::Scenario`], [`StudyError::Simulate`].
     pub fn new(
-        kind: Kind,
+        kind: ClutterKind,
         setup: &Setup,
         indexed: &'a IndexedCatalog<'a>,
     ) -> Result<Self, StudyError> {
@@ -87,7 +87,7 @@ impl<'a> FrameMaker<'a> {
         let mut canvas = ClutterCanvas::new(frame.width, frame.height);
         let frame = self.with_clutter(frame, &mut canvas, &mut random)?;
         truth.stars.retain_mut(|star| self.is_seen(star, &canvas));
-        let sky = Some(TrueSky { pointing, truth });
+        let sky = Some(FrameTruth { pointing, truth });
         Ok(ClutteredFrame { frame, sky })
     }
 
@@ -111,21 +111,21 @@ impl<'a> FrameMaker<'a> {
         random: &mut ChaCha8Rng,
     ) -> Result<Frame<'static>, StudyError> {
         match self.kind {
-            Kind::Foliage => scenery::foliage(canvas, random),
-            Kind::Edges => {
+            ClutterKind::Foliage => scenery::foliage(canvas, random),
+            ClutterKind::Edges => {
                 scenery::roofs(canvas, random);
                 if random.random_bool(0.5) {
                     canvas.turn();
                 }
             }
-            Kind::Reflections => scenery::ghosts(canvas, random),
+            ClutterKind::Reflections => scenery::ghosts(canvas, random),
             _ => (),
         }
         let frame = recording::behind(frame, canvas, random);
         Ok(match self.kind {
-            Kind::Reflections => recording::mirrored_in_window(frame, random),
-            Kind::BlackLevel => recording::cut_off(frame, random),
-            Kind::Jpeg => recording::as_jpeg(&frame, random)?,
+            ClutterKind::Reflections => recording::mirrored_in_window(frame, random),
+            ClutterKind::BlackLevel => recording::cut_off(frame, random),
+            ClutterKind::Jpeg => recording::as_jpeg(&frame, random)?,
             _ => frame,
         })
     }
@@ -139,7 +139,7 @@ fn limit_vmag(scenario: &Scenario) -> Result<f64, ScenarioError> {
 
 /// `setup` with the clutter that the simulator draws itself.
 fn with_clutter(
-    kind: Kind,
+    kind: ClutterKind,
     setup: &Setup,
     plain: &Simulator,
     indexed: &IndexedCatalog,
@@ -156,17 +156,17 @@ fn with_clutter(
     let camera = plain.camera();
     let scene = &mut setup.scene;
     match kind {
-        Kind::Clouds => {
+        ClutterKind::Clouds => {
             let (extinction_mag, light, share) = CLOUD;
             (scene.cloud_mag, scene.cloud_light) = (extinction_mag, light);
             scene.cloud_size_px = share * camera.width_px;
         }
-        Kind::Trails => {
+        ClutterKind::Trails => {
             let turn_rad = TRAIL_PX / std::f64::consts::FRAC_PI_4 / camera.focal_length_px();
             let exposure_s = setup.scenario.conditions.exposure_s;
             scene.tumble_deg_s = turn_rad * DEG_PER_RAD / exposure_s;
         }
-        Kind::FalseStars => {
+        ClutterKind::FalseStars => {
             let limit_vmag = limit_vmag(&setup.scenario)?;
             let stars = indexed.catalog().stars();
             let bright = stars.partition_point(|star| f64::from(star.v_mag) <= limit_vmag);
@@ -174,9 +174,9 @@ fn with_clutter(
             let frame_sq_deg = camera.solid_angle_sr() * DEG_PER_RAD.powi(2);
             scene.false_stars += bright as f64 * frame_sq_deg / sphere_sq_deg;
         }
-        Kind::Blends => setup.scenario.camera.focal_length_mm /= 2.0,
-        Kind::HotPixels => add_hot_pixels(&mut setup.scenario)?,
-        Kind::CosmicRays => {
+        ClutterKind::Blends => setup.scenario.camera.focal_length_mm /= 2.0,
+        ClutterKind::HotPixels => add_hot_pixels(&mut setup.scenario)?,
+        ClutterKind::CosmicRays => {
             let sheet = &setup.scenario.camera;
             let pixel_cm2 = sheet.pitch_x_um * sheet.pitch_y_um * CM2_PER_UM2;
             let px_s = 1e6 / COSMIC_RAYS_PER_MPX * setup.scenario.conditions.exposure_s;

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// A kind of frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum ClutterKind {
     /// Stars alone, to compare with.
     Clean,
     /// Branches with leaves before the sky, dark or lit by lamps.
@@ -50,7 +50,7 @@ pub enum Kind {
     CosmicRays,
 }
 
-impl Kind {
+impl ClutterKind {
     /// All of them.
     pub const ALL: [Self; 21] = [
         Self::Clean,
@@ -131,11 +131,11 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_json_and_no_two_are_the_same() {
-        for kind in Kind::ALL {
-            assert_eq!(Kind::named(kind.name()), Some(kind));
+        for kind in ClutterKind::ALL {
+            assert_eq!(ClutterKind::named(kind.name()), Some(kind));
             let json = serde_json::to_string(&kind).unwrap();
             assert_eq!(json, format!("\"{}\"", kind.name()));
         }
-        assert_eq!(Kind::named("sky"), None);
+        assert_eq!(ClutterKind::named("sky"), None);
     }
 }

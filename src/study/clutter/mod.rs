@@ -28,9 +28,9 @@ mod recording;
 mod scenery;
 mod table;
 
-pub use evaluation::FrameResult;
-pub use frames::{ClutteredFrame, FrameMaker, TrueSky};
-pub use kind::Kind;
+pub use evaluation::ClutterFrameResult;
+pub use frames::{ClutteredFrame, FrameMaker, FrameTruth};
+pub use kind::ClutterKind;
 pub use table::KindResult;
 
 use crate::detect::DetectConfig;
@@ -41,7 +41,7 @@ use crate::study::{StudyError, trials};
 
 /// What all kinds of frames of a study have in common.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Protocol {
+pub struct ClutterProtocol {
     /// Camera, sky, exposure and scene.
     pub setup: Setup,
     /// Frames of each kind.
@@ -55,8 +55,8 @@ pub struct Protocol {
 /// # Errors
 /// [`StudyError`] where a frame cannot be made or processed.
 pub fn run(
-    kind: Kind,
-    protocol: &Protocol,
+    kind: ClutterKind,
+    protocol: &ClutterProtocol,
     indexed: &IndexedCatalog,
     done: &(dyn Fn() + Sync),
 ) -> Result<KindResult, StudyError> {
@@ -74,6 +74,7 @@ pub fn run(
         let solution = solve_frame(&made.frame, &context, workspace)?;
         Ok(evaluation::evaluate(&maker, made.sky.as_ref(), &solution))
     };
-    let results: Result<Vec<FrameResult>, StudyError> = trials::run(protocol.frames, done, result);
+    let results: Result<Vec<ClutterFrameResult>, StudyError> =
+        trials::run(protocol.frames, done, result);
     Ok(KindResult::new(kind, &results?, &protocol.setup.scenario))
 }

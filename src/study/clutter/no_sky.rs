@@ -2,7 +2,7 @@
 
 use super::canvas::ClutterCanvas;
 use super::chance::{log_uniform, normal, place};
-use super::kind::Kind;
+use super::kind::ClutterKind;
 use super::recording::JPEG_QUALITY;
 use super::scenery;
 use crate::base::coords::PixelPoint;
@@ -19,20 +19,23 @@ const HEIGHT: usize = 768;
 const WHITE: f64 = 255.0;
 
 /// A picture of a kind that shows no sky; every second one is a JPEG.
-pub(super) fn picture(kind: Kind, random: &mut ChaCha8Rng) -> Result<Frame<'static>, FrameError> {
+pub(super) fn picture(
+    kind: ClutterKind,
+    random: &mut ChaCha8Rng,
+) -> Result<Frame<'static>, FrameError> {
     let mut canvas = ClutterCanvas::new(WIDTH, HEIGHT);
     let ground = Ground::of(kind, random);
     match kind {
-        Kind::Dots => dots(&mut canvas, random),
-        Kind::Text => text(&mut canvas, &ground, random),
-        Kind::Drawings => drawings(&mut canvas, &ground, random),
-        Kind::FoliageAlone => scenery::foliage(&mut canvas, random),
-        Kind::Windows => facade(&mut canvas, random),
-        Kind::Snow => snow(&mut canvas, random),
-        Kind::Bokeh => bokeh(&mut canvas, random),
+        ClutterKind::Dots => dots(&mut canvas, random),
+        ClutterKind::Text => text(&mut canvas, &ground, random),
+        ClutterKind::Drawings => drawings(&mut canvas, &ground, random),
+        ClutterKind::FoliageAlone => scenery::foliage(&mut canvas, random),
+        ClutterKind::Windows => facade(&mut canvas, random),
+        ClutterKind::Snow => snow(&mut canvas, random),
+        ClutterKind::Bokeh => bokeh(&mut canvas, random),
         _ => (),
     }
-    let structure = (kind == Kind::ColoredNoise).then(|| structure(random));
+    let structure = (kind == ClutterKind::ColoredNoise).then(|| structure(random));
     let mut levels = Vec::with_capacity(WIDTH * HEIGHT);
     for at in 0..WIDTH * HEIGHT {
         let added = structure.as_ref().map_or(0.0, |structure| structure[at]);
@@ -63,8 +66,9 @@ struct Ground {
 }
 
 impl Ground {
-    fn of(kind: Kind, random: &mut ChaCha8Rng) -> Self {
-        let is_paper = matches!(kind, Kind::Text | Kind::Drawings) && random.random_bool(0.5);
+    fn of(kind: ClutterKind, random: &mut ChaCha8Rng) -> Self {
+        let is_paper =
+            matches!(kind, ClutterKind::Text | ClutterKind::Drawings) && random.random_bool(0.5);
         Self {
             level: if is_paper {
                 random.random_range(180.0..250.0)
@@ -273,7 +277,7 @@ mod tests {
 
     #[test]
     fn every_picture_shows_something_and_no_two_are_the_same() {
-        for kind in Kind::ALL.into_iter().filter(|kind| !kind.is_sky()) {
+        for kind in ClutterKind::ALL.into_iter().filter(|kind| !kind.is_sky()) {
             let make = |seed| picture(kind, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap();
             let (one, other) = (make(1), make(2));
             assert_eq!(one.pixels, make(1).pixels);

@@ -16,13 +16,13 @@ const WHITE: f64 = 255.0;
 
 /// The sky of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ClutterSky {
+pub(super) struct RecordedSky {
     level: f64,
     /// Standard deviation of a pixel.
     noise: f64,
 }
 
-impl ClutterSky {
+impl RecordedSky {
     /// The median, and the noise from the differences of neighbors.
     pub(super) fn of(frame: &Frame) -> Self {
         /// Standard deviation over the median absolute difference of two neighbors.
@@ -47,7 +47,7 @@ pub(super) fn behind(
     canvas: &ClutterCanvas,
     random: &mut ChaCha8Rng,
 ) -> Frame<'static> {
-    let sky = ClutterSky::of(&frame);
+    let sky = RecordedSky::of(&frame);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let layers = canvas.opacity.iter().zip(&canvas.light).zip(&canvas.glow);
     for (pixel, ((opacity, light), glow)) in frame.values_mut().iter_mut().zip(layers) {
@@ -76,7 +76,7 @@ pub(super) fn mirrored_in_window(
     mut frame: Frame<'static>,
     random: &mut ChaCha8Rng,
 ) -> Frame<'static> {
-    let sky = ClutterSky::of(&frame);
+    let sky = RecordedSky::of(&frame);
     let share = random.random_range(0.1..0.6);
     let most = frame.saturation_adu.unwrap_or(f32::MAX);
     let shift: usize = random.random_range(0..frame.width);
@@ -98,7 +98,7 @@ pub(super) fn mirrored_in_window(
 /// `frame` in eight bits, with a black level that is above the sky in parts of it: the sky becomes
 /// brighter across the frame.
 pub(super) fn cut_off(mut frame: Frame<'static>, random: &mut ChaCha8Rng) -> Frame<'static> {
-    let sky = ClutterSky::of(&frame);
+    let sky = RecordedSky::of(&frame);
     // Levels in one standard deviation of the noise.
     let levels = random.random_range(0.6..2.5);
     let gain = levels / sky.noise;
@@ -125,7 +125,7 @@ pub(super) fn as_jpeg(
 ) -> Result<Frame<'static>, FrameError> {
     /// Response of red, green and blue pixels to the light of a grey surface.
     const RESPONSE: [f64; 3] = [0.5, 1.0, 0.6];
-    let sky = ClutterSky::of(frame);
+    let sky = RecordedSky::of(frame);
     let black = sky.level - sky.noise * random.random_range(2.0..8.0);
     let white = sky.level + sky.noise * log_uniform(random, 60.0, 1000.0);
     let mosaic: Vec<f64> = frame
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn level_and_noise_of_a_sky_are_measured() {
         // The median difference of whole levels is a whole number: 12 for 11.4.
-        let sky = ClutterSky::of(&noisy(300.0, 12.0));
+        let sky = RecordedSky::of(&noisy(300.0, 12.0));
         assert!(
             (sky.level - 300.0).abs() < 1.0 && (sky.noise - 12.0).abs() < 0.7,
             "{sky:?}"
@@ -174,7 +174,7 @@ mod tests {
     fn an_opaque_shape_replaces_the_sky() {
         let mut canvas = ClutterCanvas::new(200, 160);
         canvas.below([0.0, 200.0], |_| 80.0, |_| 10.0);
-        let sky = ClutterSky::of(&noisy(300.0, 12.0));
+        let sky = RecordedSky::of(&noisy(300.0, 12.0));
         let frame = behind(
             noisy(300.0, 12.0),
             &canvas,

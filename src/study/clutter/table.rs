@@ -1,7 +1,7 @@
 //! Rows of results, one for each kind of frame.
 
-use super::evaluation::FrameResult;
-use super::kind::Kind;
+use super::evaluation::ClutterFrameResult;
+use super::kind::ClutterKind;
 use crate::base::format::{to_decimals, to_significant};
 use crate::model::sensitivity::Scenario;
 use crate::study::robustness::{Answers, Interval};
@@ -14,7 +14,7 @@ const HEADING: &str = "                  frames   right  wrong  detected  false/
 #[expect(missing_docs, reason = "docs/json.md describes the fields")]
 pub struct KindResult {
     pub camera: String,
-    pub kind: Kind,
+    pub kind: ClutterKind,
     pub is_sky: bool,
     pub frames: usize,
     pub right: usize,
@@ -33,9 +33,9 @@ pub struct KindResult {
 
 impl KindResult {
     /// The results of the frames of a kind in a study of `scenario`.
-    pub fn new(kind: Kind, results: &[FrameResult], scenario: &Scenario) -> Self {
+    pub fn new(kind: ClutterKind, results: &[ClutterFrameResult], scenario: &Scenario) -> Self {
         let answers: Answers = results.iter().map(|result| result.answer).collect();
-        let sum = |of: fn(&FrameResult) -> usize| results.iter().map(of).sum::<usize>();
+        let sum = |of: fn(&ClutterFrameResult) -> usize| results.iter().map(of).sum::<usize>();
         let megapixels: f64 = results.iter().map(|result| result.megapixels).sum();
         let (named, misnamed) = (sum(|r| r.named), sum(|r| r.misnamed));
         let false_detections = sum(|r| r.false_detections);
@@ -124,8 +124,8 @@ mod tests {
     use crate::camera::data_sheet::Preset;
     use crate::study::robustness::Answer;
 
-    fn result(answer: Answer, named: usize, misnamed: usize) -> FrameResult {
-        FrameResult {
+    fn result(answer: Answer, named: usize, misnamed: usize) -> ClutterFrameResult {
+        ClutterFrameResult {
             answer,
             megapixels: 2.0,
             detected: 30,
@@ -143,7 +143,11 @@ mod tests {
             result(Answer::Wrong, 10, 10),
             result(Answer::None, 0, 0),
         ];
-        let row = KindResult::new(Kind::Foliage, &results, &Scenario::of(Preset::Imx174));
+        let row = KindResult::new(
+            ClutterKind::Foliage,
+            &results,
+            &Scenario::of(Preset::Imx174),
+        );
         assert_eq!((row.frames, row.right, row.wrong), (3, 1, 1));
         assert_eq!((row.named, row.misnamed), (30, 11));
         assert_eq!(row.stated_misnamed, 0.75);

@@ -23,10 +23,12 @@ mod text;
 pub use caller::Caller;
 pub use error::{DefocusError, NoiseError};
 pub use noise::{DarkNoise, Noise};
-pub use plan::Plan;
+pub use plan::DefocusPlan;
 pub use report::{
-    BestAtNoise, BestRadius, CurveRow, DefocusReport, GridRow, RequiredError, SpotRadius,
-    StarReport,
+    BestAtNoise, BestRadius, CurveRow, DefocusReport, DefocusStarReport, GridRow, RequiredError,
+    SpotRadius,
 };
-pub use star::{BRIGHTER_THAN_LIMIT_MAG, RadiusPoint, StarModel, StarStudy, Theory, default_v_mag};
+pub use star::{
+    BRIGHTER_THAN_LIMIT_MAG, DefocusStar, PredictedError, RadiusPoint, StarStudy, default_v_mag,
+};
 pub use surface::{ClosedFormReport, PaperSurface, SurfaceReport};

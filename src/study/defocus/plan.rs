@@ -3,10 +3,10 @@
 use super::caller::Caller;
 use super::error::DefocusError;
 use super::noise::Noise;
-use super::star::{RadiusPoint, StarModel, StarStudy, default_v_mag};
+use super::star::{DefocusStar, RadiusPoint, StarStudy, default_v_mag};
 use crate::model::defocus::{
-    EnergyStudy, ErrorCurve, ErrorGrid, Expected, Grid, IsoLine, Lens, PeakStudy, SpotInWindow,
-    Surface,
+    DefocusLens, EnergyStudy, ErrorCurve, ErrorGrid, ExpectedError, IsoLine, PeakStudy,
+    SpotInWindow, SpotNoiseGrid, Surface,
 };
 use crate::model::sensitivity::Scenario;
 use rayon::prelude::*;
@@ -17,15 +17,15 @@ const MIN_TRIALS: usize = 1000;
 const DEFAULT_SEED: u64 = 1;
 
 /// Stars, radii and noises of a study.
-pub struct Plan {
+pub struct DefocusPlan {
     /// The stars, all of one kind.
-    pub stars: Vec<StarModel>,
+    pub stars: Vec<DefocusStar>,
     /// Radii and noises.
-    pub grid: Grid,
+    pub grid: SpotNoiseGrid,
     /// The noise for which radii are reported.
     pub noise: Noise,
     /// The lens, if there is a camera.
-    pub lens: Option<Lens>,
+    pub lens: Option<DefocusLens>,
     /// The camera's spot radius, in pixels.
     pub present_px: Option<f64>,
     /// Required errors, in pixels.
@@ -34,7 +34,7 @@ pub struct Plan {
     pub seed: u64,
 }
 
-impl Plan {
+impl DefocusPlan {
     /// Stars of these magnitudes, or one of [`default_v_mag`], under a camera; errors over radii and noises
     /// around `noise`.
     ///
@@ -50,11 +50,11 @@ impl Plan {
             [] => vec![default_v_mag(&scenario)?],
             given => given.to_vec(),
         };
-        let star = |v_mag| StarModel::Energy(Box::new(EnergyStudy::new(scenario.clone(), v_mag)));
+        let star = |v_mag| DefocusStar::Energy(Box::new(EnergyStudy::new(scenario.clone(), v_mag)));
         Ok(Self {
             stars: v_mags.into_iter().map(star).collect(),
-            grid: Grid::around(noise.value()),
-            lens: Some(Lens::of(&scenario.camera, 0.0)),
+            grid: SpotNoiseGrid::around(noise.value()),
+            lens: Some(DefocusLens::of(&scenario.camera, 0.0)),
             present_px: Some(scenario.camera.spot_sigma_px),
             noise,
             required_px: Vec::new(),
@@ -65,8 +65,8 @@ impl Plan {
     /// The paper's experiment.
     pub fn of_paper(noise: Noise) -> Self {
         Self {
-            stars: vec![StarModel::Peak(PeakStudy::default())],
-            grid: Grid::of_paper(),
+            stars: vec![DefocusStar::Peak(PeakStudy::default())],
+            grid: SpotNoiseGrid::of_paper(),
             noise,
             lens: None,
             present_px: None,
@@ -99,7 +99,7 @@ impl Plan {
         stars.map(|star| self.study(star, caller)).collect()
     }
 
-    fn study(&self, star: &StarModel, caller: &Caller<'_>) -> Result<StarStudy, DefocusError> {
+    fn study(&self, star: &DefocusStar, caller: &Caller<'_>) -> Result<StarStudy, DefocusError> {
         let points = self.points(star, caller)?;
         let curve = ErrorCurve::through(points.iter().map(|at| (at.spot_px, &at.point)))
             .ok_or_else(|| self.too_faint(star))?;
@@ -129,11 +129,11 @@ impl Plan {
     /// Measures the errors over the radius at the noise of the study.
     fn points(
         &self,
-        star: &StarModel,
+        star: &DefocusStar,
         caller: &Caller<'_>,
     ) -> Result<Vec<RadiusPoint>, DefocusError> {
         let noise = self.noise.value();
-        let grid = Grid {
+        let grid = SpotNoiseGrid {
             spots_px: self.grid.spots_px.clone(),
             noises: vec![noise],
         };
@@ -152,13 +152,13 @@ impl Plan {
     /// The closed form over the grid, in the order of its points, for spots of this kind.
     fn expected(
         &self,
-        star: &StarModel,
+        star: &DefocusStar,
         spot: fn(&PeakStudy, f64) -> SpotInWindow,
-    ) -> Option<Vec<Expected>> {
-        let StarModel::Peak(study) = star else {
+    ) -> Option<Vec<ExpectedError>> {
+        let DefocusStar::Peak(study) = star else {
             return None;
         };
-        let at_radius = |&spot_px: &f64| -> Vec<Expected> {
+        let at_radius = |&spot_px: &f64| -> Vec<ExpectedError> {
             let spot = spot(study, spot_px);
             let noises = self.grid.noises.iter();
             noises.map(|&noise| spot.expected(noise)).collect()
@@ -167,10 +167,10 @@ impl Plan {
         Some(rows.concat())
     }
 
-    fn too_faint(&self, star: &StarModel) -> DefocusError {
+    fn too_faint(&self, star: &DefocusStar) -> DefocusError {
         let limits = self.grid.spots_px.iter().filter_map(|&spot_px| match star {
-            StarModel::Energy(study) => study.reach(spot_px, self.noise.value()).limit_vmag,
-            StarModel::Peak(_) => None,
+            DefocusStar::Energy(study) => study.reach(spot_px, self.noise.value()).limit_vmag,
+            DefocusStar::Peak(_) => None,
         });
         DefocusError::TooFaint {
             v_mag: star.v_mag().unwrap_or(f64::NAN),

@@ -1,10 +1,10 @@
 //! The results of a study as plain values, with their units in the names.
 
 use super::noise::Noise;
-use super::plan::Plan;
-use super::star::{RadiusPoint, StarModel, StarStudy, Theory};
+use super::plan::DefocusPlan;
+use super::star::{DefocusStar, PredictedError, RadiusPoint, StarStudy};
 use super::surface::{ClosedFormReport, SurfaceReport};
-use crate::model::defocus::{Centroiding, ErrorCurve, IsoLine, Lens, Optimum, Parabola};
+use crate::model::defocus::{Centroiding, DefocusLens, ErrorCurve, IsoLine, Optimum, Parabola};
 use serde::Serialize;
 
 /// The results of a study.
@@ -22,14 +22,14 @@ pub struct DefocusReport {
     pub radii: usize,
     pub noises: [f64; 2],
     pub noise_count: usize,
-    pub lens: Option<Lens>,
-    pub stars: Vec<StarReport>,
+    pub lens: Option<DefocusLens>,
+    pub stars: Vec<DefocusStarReport>,
 }
 
 /// The results of one star. Unless a noise is named they hold at the noise of the study.
 #[derive(Debug, Serialize)]
 #[expect(missing_docs, reason = "docs/json.md describes the fields")]
-pub struct StarReport {
+pub struct DefocusStarReport {
     pub vmag: Option<f64>,
     pub peak: Option<f64>,
     pub best: BestRadius,
@@ -121,14 +121,16 @@ pub struct GridRow {
 
 impl DefocusReport {
     /// The report of `plan`, of which `studies` are the results.
-    pub fn new(plan: &Plan, studies: &[StarStudy]) -> Self {
+    pub fn new(plan: &DefocusPlan, studies: &[StarStudy]) -> Self {
         let (spots, noises) = (&plan.grid.spots_px, &plan.grid.noises);
         let ends = |values: &[f64]| [values[0], values[values.len() - 1]];
         let (normalisation, centroid, noise_unit) = match &plan.stars[0] {
-            StarModel::Peak(_) => ("peak", Centroiding::FixedWindow, "part of full scale"),
-            StarModel::Energy(study) => ("energy", study.centroiding, "e"),
+            DefocusStar::Peak(_) => ("peak", Centroiding::FixedWindow, "part of full scale"),
+            DefocusStar::Energy(study) => ("energy", study.centroiding, "e"),
         };
-        let stars = studies.iter().map(|study| StarReport::new(plan, study));
+        let stars = studies
+            .iter()
+            .map(|study| DefocusStarReport::new(plan, study));
         Self {
             schema: 1,
             normalisation,
@@ -153,8 +155,8 @@ impl DefocusReport {
     }
 }
 
-impl StarReport {
-    fn new(plan: &Plan, study: &StarStudy) -> Self {
+impl DefocusStarReport {
+    fn new(plan: &DefocusPlan, study: &StarStudy) -> Self {
         let curve = &study.curve;
         let optimum = curve.optimum();
         let at = |radius_px: f64| SpotRadius::new(radius_px, curve.at(radius_px), plan.lens);
@@ -163,8 +165,8 @@ impl StarReport {
         let required = plan.required_px.iter();
         let best_by_noise = best_by_noise(plan, study);
         let peak = match &study.star {
-            StarModel::Peak(study) => Some(study),
-            StarModel::Energy(_) => None,
+            DefocusStar::Peak(study) => Some(study),
+            DefocusStar::Energy(_) => None,
         };
         let closed_form = peak.zip(study.expected.as_deref());
         Self {
@@ -195,7 +197,7 @@ impl StarReport {
     }
 }
 
-fn best_by_noise(plan: &Plan, study: &StarStudy) -> Vec<BestAtNoise> {
+fn best_by_noise(plan: &DefocusPlan, study: &StarStudy) -> Vec<BestAtNoise> {
     let noises = plan.grid.noises.iter().zip(&study.curves);
     let best = noises.map(|(&noise, curve)| BestAtNoise {
         noise,
@@ -214,7 +216,7 @@ fn best_as_parabola(best_by_noise: &[BestAtNoise]) -> Option<Parabola> {
 }
 
 impl SpotRadius {
-    fn new(radius_px: f64, error_px: f64, lens: Option<Lens>) -> Self {
+    fn new(radius_px: f64, error_px: f64, lens: Option<DefocusLens>) -> Self {
         Self {
             radius_px,
             radius_um: lens.map(|lens| lens.spot_um(radius_px)),
@@ -242,8 +244,8 @@ impl RequiredError {
 impl CurveRow {
     fn new(study: &StarStudy, at: &RadiusPoint) -> Self {
         let (expected, reach) = match &at.theory {
-            Theory::Expected(expected) => (Some(expected), None),
-            Theory::Reach(reach) => (None, Some(reach)),
+            PredictedError::Expected(expected) => (Some(expected), None),
+            PredictedError::Reach(reach) => (None, Some(reach)),
         };
         let [first, last] = study.curve.range_px();
         let is_inside = (first..=last).contains(&at.spot_px);
@@ -267,7 +269,7 @@ impl CurveRow {
 impl GridRow {
     /// The rows of a star, one for each point of the grid.
     pub fn rows(study: &StarStudy) -> impl Iterator<Item = Self> {
-        let is_peak = matches!(study.star, StarModel::Peak(_));
+        let is_peak = matches!(study.star, DefocusStar::Peak(_));
         let points = study.errors.rows().enumerate();
         points.map(move |(number, (radius_px, noise, point))| Self {
             vmag: study.star.v_mag(),

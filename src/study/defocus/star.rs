@@ -3,14 +3,14 @@
 use super::caller::Caller;
 use super::error::DefocusError;
 use crate::model::defocus::{
-    EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, Expected, Grid, IsoLine, MeasureError,
-    PeakStudy, Reach, Surface, SurfaceError,
+    EnergyStudy, ErrorCurve, ErrorGrid, ErrorPoint, ExpectedError, IsoLine, MeasureError,
+    PeakStudy, SpotLimits, SpotNoiseGrid, Surface, SurfaceError,
 };
 use crate::model::sensitivity::{Budget, Detector, Rule, Scenario};
 
 /// A star and how its centroid is measured.
 #[derive(Debug, Clone)]
-pub enum StarModel {
+pub enum DefocusStar {
     /// Its brightest pixel is given: the paper's experiment.
     Peak(PeakStudy),
     /// Its light is given: a star of a camera.
@@ -34,11 +34,11 @@ pub fn default_v_mag(scenario: &Scenario) -> Result<f64, DefocusError> {
     Ok(((limit - BRIGHTER_THAN_LIMIT_MAG) * 10.0).round() / 10.0)
 }
 
-impl StarModel {
+impl DefocusStar {
     /// Measures the errors on `grid`, see [`ErrorGrid::measure`].
     pub(super) fn measure(
         &self,
-        grid: Grid,
+        grid: SpotNoiseGrid,
         seed: u64,
         caller: &Caller<'_>,
     ) -> Result<ErrorGrid, MeasureError> {
@@ -87,10 +87,10 @@ impl StarModel {
     }
 
     /// What theory predicts at a radius in pixels and a noise in the unit of the grid.
-    pub(super) fn theory(&self, spot_px: f64, noise: f64) -> Theory {
+    pub(super) fn theory(&self, spot_px: f64, noise: f64) -> PredictedError {
         match self {
-            Self::Peak(study) => Theory::Expected(study.expected(spot_px, noise)),
-            Self::Energy(study) => Theory::Reach(study.reach(spot_px, noise)),
+            Self::Peak(study) => PredictedError::Expected(study.expected(spot_px, noise)),
+            Self::Energy(study) => PredictedError::Reach(study.reach(spot_px, noise)),
         }
     }
 }
@@ -103,29 +103,29 @@ pub struct RadiusPoint {
     /// The measured error.
     pub point: ErrorPoint,
     /// The prediction.
-    pub theory: Theory,
+    pub theory: PredictedError,
 }
 
 /// What theory predicts of the error.
 #[derive(Debug, Clone, Copy)]
-pub enum Theory {
+pub enum PredictedError {
     /// The closed form of the paper's experiment.
-    Expected(Expected),
+    Expected(ExpectedError),
     /// Cramér-Rao bound and limit of a camera.
-    Reach(Reach),
+    Reach(SpotLimits),
 }
 
 /// The results of one star.
 #[derive(Debug)]
 pub struct StarStudy {
     /// The star.
-    pub star: StarModel,
+    pub star: DefocusStar,
     /// Errors on the grid.
     pub errors: ErrorGrid,
     /// The closed form at each point of the grid, if there is one.
-    pub expected: Option<Vec<Expected>>,
+    pub expected: Option<Vec<ExpectedError>>,
     /// The same for spots that are sampled instead of integrated.
-    pub sampled: Option<Vec<Expected>>,
+    pub sampled: Option<Vec<ExpectedError>>,
     /// The surface through the errors.
     pub surface: Result<Surface, SurfaceError>,
     /// The curve over the radius at each noise of the grid.

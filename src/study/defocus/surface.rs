@@ -1,7 +1,7 @@
 //! How well the errors agree with a polynomial surface and with the closed form.
 
-use super::star::{StarModel, StarStudy};
-use crate::model::defocus::{ErrorGrid, Expected, PAPER_RESIDUAL_PX, Surface};
+use super::star::{DefocusStar, StarStudy};
+use crate::model::defocus::{ErrorGrid, ExpectedError, PAPER_RESIDUAL_PX, Surface};
 use serde::Serialize;
 
 /// The surface through the errors of a star.
@@ -50,7 +50,7 @@ impl SurfaceReport {
         let errors = &study.errors;
         let fitted = study.surface.as_ref().ok().copied();
         let scatter_px = errors.scatter_px();
-        let is_peak = matches!(study.star, StarModel::Peak(_));
+        let is_peak = matches!(study.star, DefocusStar::Peak(_));
         let paper = fitted.filter(|_| is_peak);
         Self {
             coefficients: fitted,
@@ -75,7 +75,7 @@ impl PaperSurface {
 }
 
 impl ClosedFormReport {
-    pub(super) fn new(trials: usize, expected: &[Expected], errors: &ErrorGrid) -> Self {
+    pub(super) fn new(trials: usize, expected: &[ExpectedError], errors: &ErrorGrid) -> Self {
         let (mut ratios, mut squares, mut most_bias_part) = (0.0, 0.0, 0.0_f64);
         for (point, expected) in errors.points.iter().zip(expected) {
             ratios += (point.rms_px / expected.rms_px).powi(2);

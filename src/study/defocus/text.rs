@@ -1,9 +1,11 @@
 //! The results of a study as text for people.
 
-use super::report::{BestRadius, CurveRow, DefocusReport, RequiredError, SpotRadius, StarReport};
+use super::report::{
+    BestRadius, CurveRow, DefocusReport, DefocusStarReport, RequiredError, SpotRadius,
+};
 use super::surface::{ClosedFormReport, PaperSurface};
 use crate::base::format::five_digits;
-use crate::model::defocus::{Centroiding, IsoLine, Lens, Surface};
+use crate::model::defocus::{Centroiding, DefocusLens, IsoLine, Surface};
 use std::fmt::Write as _;
 
 /// Radii of the rows of the table, in pixels, where the grid has them.
@@ -49,7 +51,7 @@ impl DefocusReport {
         text
     }
 
-    fn radii_text(&self, star: &StarReport) -> String {
+    fn radii_text(&self, star: &DefocusStarReport) -> String {
         let mut text = star.title();
         for (name, value) in self.radii_lines(star) {
             let _ = writeln!(text, "  {name:<26} {value}");
@@ -58,7 +60,7 @@ impl DefocusReport {
     }
 
     /// The required radii, the best one and that of the camera, each with its name.
-    pub fn radii_lines(&self, star: &StarReport) -> Vec<(String, String)> {
+    pub fn radii_lines(&self, star: &DefocusStarReport) -> Vec<(String, String)> {
         let of_required = |required: &RequiredError| {
             let error_px = five_digits(required.required_error_px);
             let name = format!("error of {error_px} px or less");
@@ -86,7 +88,7 @@ impl DefocusReport {
         )
     }
 
-    fn required_text(&self, star: &StarReport, required: &RequiredError) -> String {
+    fn required_text(&self, star: &DefocusStarReport, required: &RequiredError) -> String {
         let (Some(smallest), Some(largest)) = (&required.smallest, &required.largest) else {
             return format!(
                 "no radius: the best that can be had is {:.4} px, with {:.2} px",
@@ -123,7 +125,7 @@ impl DefocusReport {
     }
 
     /// The radii of each line of equal error at a few noises.
-    fn isolines_text(&self, star: &StarReport) -> String {
+    fn isolines_text(&self, star: &DefocusStarReport) -> String {
         let mut text = format!(
             "\n  radii (px) of equal error at a noise of ({})\n",
             self.noise_unit
@@ -160,7 +162,7 @@ impl DefocusReport {
     }
 
     /// The grid, and how well the closed form and the surface agree with its errors.
-    fn grid_text(&self, star: &StarReport) -> String {
+    fn grid_text(&self, star: &DefocusStarReport) -> String {
         let surface = &star.surface;
         let scatter_px = surface.scatter_px.unwrap_or(f64::NAN);
         let mut text = format!(
@@ -204,7 +206,7 @@ fn normalisation_text(peak: Option<f64>) -> String {
     }
 }
 
-fn lens_text(lens: &Lens) -> String {
+fn lens_text(lens: &DefocusLens) -> String {
     format!(
         "defocus: geometric blur alone, at f/{} with a spot of {} px in focus; diffraction makes {} px at {} nm\n",
         five_digits(lens.f_number),
@@ -214,7 +216,7 @@ fn lens_text(lens: &Lens) -> String {
     )
 }
 
-impl StarReport {
+impl DefocusStarReport {
     fn title(&self) -> String {
         match self.vmag {
             Some(v_mag) => format!("\nstar of V {}\n", five_digits(v_mag)),

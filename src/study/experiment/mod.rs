@@ -28,7 +28,7 @@ mod text;
 
 pub use published::{Published, PublishedStar};
 pub use report::{ExperimentReport, LimitReport, SCHEMA};
-pub use summary::{CompletenessBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
+pub use summary::{DetectionBin, ExpectedFaintest, FoundFaintest, SimulatedReport};
 pub use table::{FieldReport, TableReport, TableStar};
 
 use crate::frame::Frame;
@@ -41,7 +41,7 @@ use simulated::Simulation;
 
 /// Number of simulated frames, and their seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Trials {
+pub struct TrialSettings {
     /// Frames to simulate.
     pub count: u64,
     /// Seed of the random numbers.
@@ -50,7 +50,7 @@ pub struct Trials {
 
 /// The result of an experiment.
 #[derive(Debug)]
-pub struct Run {
+pub struct ExperimentRun {
     /// The report.
     pub report: ExperimentReport,
     /// The first simulated frame with its solution; `None` where the paper's table was not
@@ -65,9 +65,9 @@ pub struct Run {
 pub fn run(
     published: &Published,
     indexed: &IndexedCatalog,
-    trials: Trials,
+    trials: TrialSettings,
     done: &(dyn Fn() + Sync),
-) -> Result<Run, StudyError> {
+) -> Result<ExperimentRun, StudyError> {
     let scenario = Scenario::of(published.preset);
     let budget = Budget::new(&scenario);
     let detector = Detector::new(Rule::MatchedFilter, &scenario, &budget);
@@ -89,7 +89,7 @@ pub fn run(
         simulated: None,
     };
     let Some(found) = solution.outcome.identification() else {
-        return Ok(Run {
+        return Ok(ExperimentRun {
             report,
             first: None,
         });
@@ -114,7 +114,7 @@ pub fn run(
     report.simulated = Some(SimulatedReport::new(&simulated, &detector, trials.seed));
     let (frame, _) = simulation.frame(0)?;
     let solution = simulation.solve(&frame, &mut Workspace::new())?;
-    Ok(Run {
+    Ok(ExperimentRun {
         report,
         first: Some((frame, solution)),
     })

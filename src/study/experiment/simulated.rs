@@ -30,7 +30,7 @@ pub(super) struct Simulation<'a> {
 
 /// The result of one simulated frame.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct FrameResult {
+pub(super) struct ExperimentFrameResult {
     /// The catalogue stars on the frame, also those too faint to be found.
     pub stars: Vec<StarResult>,
     /// The expected faintest star: for this detector, and by the paper's rule.
@@ -66,7 +66,7 @@ impl Simulation<'_> {
         &self,
         frames: u64,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<FrameResult>, StudyError> {
+    ) -> Result<Vec<ExperimentFrameResult>, StudyError> {
         trials::run(frames, done, |number, workspace: &mut Workspace| {
             let (frame, truth) = self.frame(number)?;
             let solution = self.solve(&frame, workspace)?;
@@ -93,7 +93,12 @@ impl Simulation<'_> {
         Ok(solve_frame(frame, self.context, workspace)?)
     }
 
-    fn evaluate(&self, truth: &Truth, solution: &Solution, catalog: &Catalog) -> FrameResult {
+    fn evaluate(
+        &self,
+        truth: &Truth,
+        solution: &Solution,
+        catalog: &Catalog,
+    ) -> ExperimentFrameResult {
         let light = LightMap::of(self.scenario, truth);
         let owners: Vec<StarIndex> = solution
             .sources
@@ -112,7 +117,7 @@ impl Simulation<'_> {
             identified: star.catalog.is_some_and(named),
         });
         let v_mags = || truth.stars.iter().map(|star| star.v_mag);
-        FrameResult {
+        ExperimentFrameResult {
             stars: stars.collect(),
             expected: self
                 .detectors

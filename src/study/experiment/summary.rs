@@ -1,6 +1,6 @@
 //! Summary of the simulated frames.
 
-use super::simulated::{FrameResult, IdentifiedStars, SHIFT_PX, StarResult};
+use super::simulated::{ExperimentFrameResult, IdentifiedStars, SHIFT_PX, StarResult};
 use crate::base::format::to_decimals;
 use crate::base::statistics::mean_and_squares;
 use crate::model::sensitivity::{Detector, Faintest};
@@ -20,7 +20,7 @@ pub struct SimulatedReport {
     pub stars_named: f64,
     pub named_wrongly: usize,
     pub faintest_wrong: usize,
-    pub completeness: Vec<CompletenessBin>,
+    pub completeness: Vec<DetectionBin>,
 }
 
 /// The faintest identified star, over the frames.
@@ -47,7 +47,7 @@ pub struct ExpectedFaintest {
 /// The stars of one magnitude bin on all frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[expect(missing_docs, reason = "docs/json.md describes the fields")]
-pub struct CompletenessBin {
+pub struct DetectionBin {
     pub from_vmag: f64,
     pub to_vmag: f64,
     pub stars: usize,
@@ -57,7 +57,7 @@ pub struct CompletenessBin {
 }
 
 impl SimulatedReport {
-    pub(super) fn new(results: &[FrameResult], detector: &Detector, seed: u64) -> Self {
+    pub(super) fn new(results: &[ExperimentFrameResult], detector: &Detector, seed: u64) -> Self {
         let identified: Vec<&IdentifiedStars> = results
             .iter()
             .filter_map(|frame| frame.identified.as_ref())
@@ -110,7 +110,7 @@ impl FoundFaintest {
 }
 
 impl ExpectedFaintest {
-    fn over(results: &[FrameResult], rule: usize) -> Option<Self> {
+    fn over(results: &[ExperimentFrameResult], rule: usize) -> Option<Self> {
         let all: Vec<Faintest> = results
             .iter()
             .filter_map(|frame| frame.expected[rule])
@@ -127,7 +127,7 @@ impl ExpectedFaintest {
 }
 
 /// Bins around the detector's limit; all brighter stars are one bin.
-fn completeness(results: &[FrameResult], detector: &Detector) -> Vec<CompletenessBin> {
+fn completeness(results: &[ExperimentFrameResult], detector: &Detector) -> Vec<DetectionBin> {
     const BIN_MAG: f64 = 0.25;
     /// Bins reach from this much brighter than the limit to this much fainter.
     const REACH_MAG: f64 = 1.0;
@@ -147,17 +147,17 @@ fn completeness(results: &[FrameResult], detector: &Detector) -> Vec<Completenes
 }
 
 fn bin(
-    results: &[FrameResult],
+    results: &[ExperimentFrameResult],
     detector: &Detector,
     [from_vmag, to_vmag]: [f64; 2],
-) -> CompletenessBin {
+) -> DetectionBin {
     let all = results.iter().flat_map(|result| &result.stars);
     let stars: Vec<&StarResult> = all
         .filter(|s| (from_vmag..to_vmag).contains(&s.v_mag))
         .collect();
     let count = |of: fn(&StarResult) -> bool| stars.iter().filter(|star| of(star)).count();
     let expected = stars.iter().map(|star| detector.probability(star.v_mag));
-    CompletenessBin {
+    DetectionBin {
         from_vmag,
         to_vmag,
         stars: stars.len(),

@@ -42,7 +42,7 @@ const CLOUDY_OF_THREE: u32 = 2;
 
 /// What a frame is taken of, and how the camera is set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conditions {
+pub struct TrialConditions {
     /// Seed of the frame's own random numbers.
     pub seed: u64,
     /// Modified Julian Date.
@@ -64,7 +64,7 @@ pub struct Conditions {
     /// Whether the camera's description is given.
     pub bias_known: bool,
     /// The clouds.
-    pub clouds: Clouds,
+    pub clouds: CloudConditions,
     /// The Moon.
     pub moon: Moon,
     /// Light that the lens scatters outside its circle, over the mean of the sky.
@@ -73,7 +73,7 @@ pub struct Conditions {
 
 /// Clouds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clouds {
+pub struct CloudConditions {
     /// Extinction by the thickest, in magnitudes; 0 without clouds.
     pub mag: f64,
     /// Share of the sky that they cover on average.
@@ -84,7 +84,7 @@ pub struct Clouds {
     pub light: f64,
 }
 
-impl Clouds {
+impl CloudConditions {
     fn none(size_px: f64) -> Self {
         Self {
             mag: 0.0,
@@ -104,7 +104,7 @@ pub struct Moon {
     pub illuminated: f64,
 }
 
-impl Conditions {
+impl TrialConditions {
     /// Those of a frame of this camera; `site` is where it is taken.
     ///
     /// # Errors
@@ -118,14 +118,14 @@ impl Conditions {
         let sky_px = 2.0 * camera_of(camera).field_radius_px();
         let (date, almanac) = dark_hour(random, site);
         let clouds = if random.random_ratio(CLOUDY_OF_THREE, 3) {
-            Clouds {
+            CloudConditions {
                 mag: one_of(&CLOUDS_MAG, random),
                 share: between(CLOUD_SHARES, random),
                 size_px: one_of(&CLOUD_SIZES, random) * sky_px,
                 light: one_of(&CLOUDS_LIGHT, random),
             }
         } else {
-            Clouds::none(sky_px)
+            CloudConditions::none(sky_px)
         };
         let seed = random.random();
         let mut drawn = Self {

@@ -18,9 +18,9 @@ mod text;
 mod trial;
 mod truth;
 
-pub use conditions::{Clouds, Conditions, Moon};
+pub use conditions::{CloudConditions, Moon, TrialConditions};
 pub use summary::{ClearTenth, GroupRow, SkySummary};
-pub use trial::{CellRow, FrameRow, SkyTrial};
+pub use trial::{SkyTrial, TrialCellRow, TrialFrameRow};
 
 use crate::detect::DetectConfig;
 use crate::ephemeris::observer::Site;
@@ -30,7 +30,7 @@ use crate::photometry::comparison::ObservingSetup;
 use crate::pipeline::{Context, Workspace, solve_frame};
 use crate::study::StudyError;
 use crate::study::trials::random_of;
-use truth::Truth;
+use truth::TrueNightSky;
 
 /// Simulates and measures skies over one camera.
 pub struct SkyStudy<'a> {
@@ -52,7 +52,7 @@ impl SkyStudy<'_> {
     /// unsupported detector size.
     pub fn run_one(&self, number: u64, workspace: &mut Workspace) -> Result<SkyTrial, StudyError> {
         let mut random = random_of(self.seed, number);
-        let conditions = Conditions::draw(&self.setup, self.site, &mut random)?;
+        let conditions = TrialConditions::draw(&self.setup, self.site, &mut random)?;
         let setup = conditions.applied_to(&self.setup, self.site);
         setup.check()?;
         let stars = self.indexed.catalog().stars();
@@ -62,11 +62,11 @@ impl SkyStudy<'_> {
         let context = self.context(&conditions, &setup);
         let solution = solve_frame(&frame, &context, workspace)?;
         let spot_sigma_px = setup.scenario.camera.spot_sigma_px;
-        let truth = Truth::new(&simulator, &pointing, &conditions, self.site, spot_sigma_px);
+        let truth = TrueNightSky::new(&simulator, &pointing, &conditions, self.site, spot_sigma_px);
         Ok(SkyTrial::new(number, &conditions, &solution, &truth))
     }
 
-    fn context(&self, conditions: &Conditions, setup: &Setup) -> Context<'_> {
+    fn context(&self, conditions: &TrialConditions, setup: &Setup) -> Context<'_> {
         let sheet = &setup.scenario.camera;
         Context {
             detect: DetectConfig::default(),

@@ -1,6 +1,6 @@
 //! Errors over many frames, for groups of frames.
 
-use super::trial::{CellRow, FrameRow, SkyTrial};
+use super::trial::{SkyTrial, TrialCellRow, TrialFrameRow};
 use crate::base::format::{to_decimals, to_significant};
 use crate::sky::CLEAR_MAG;
 use crate::study::robustness::Answers;
@@ -14,7 +14,7 @@ const UNCLOUDED_MAG: f64 = 0.1;
 const TENTHS: usize = 10;
 
 /// Whether a frame belongs to a group.
-type Belongs = fn(&FrameRow) -> bool;
+type Belongs = fn(&TrialFrameRow) -> bool;
 
 /// Groups of frames by name.
 const GROUPS: [(&str, Belongs); 12] = [
@@ -46,7 +46,7 @@ pub struct SkySummary {
 }
 
 /// Whether a cell of a frame belongs to a group.
-type CellBelongs = fn(&FrameRow, &CellRow) -> bool;
+type CellBelongs = fn(&TrialFrameRow, &TrialCellRow) -> bool;
 
 /// Groups of cells by name.
 const CELL_GROUPS: [(&str, CellBelongs); 8] = [
@@ -146,20 +146,20 @@ impl GroupRow {
         let cells = || trials.iter().flat_map(|trial| &trial.cells);
         let count = |holds: Belongs| frames().filter(|row| holds(row)).count();
         let answers: Answers = frames().map(|row| row.status).collect();
-        let zenith = Errors::of(frames().map(|row| {
+        let zenith = ErrorSamples::of(frames().map(|row| {
             let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
             Some((error, row.zenith_sigma_mag?))
         }));
-        let cell = Errors::of(cells().map(|row| {
+        let cell = ErrorSamples::of(cells().map(|row| {
             let error = row.mag_arcsec2? - row.true_mag_arcsec2;
             Some((error, row.sigma_mag?))
         }));
-        let extinction = Errors::of(frames().map(|row| {
+        let extinction = ErrorSamples::of(frames().map(|row| {
             let error = row.extinction_mag? - row.true_extinction_mag;
             Some((error, row.extinction_sigma_mag?))
         }));
-        let limit = Errors::of(frames().map(|row| Some((row.limit_difference_mag?, 1.0))));
-        let share = Errors::of(frames().map(|row| {
+        let limit = ErrorSamples::of(frames().map(|row| Some((row.limit_difference_mag?, 1.0))));
+        let share = ErrorSamples::of(frames().map(|row| {
             let error = row.cloud_share? - row.true_cloud_share?;
             Some((error, row.cloud_share_sigma?))
         }));
@@ -190,22 +190,22 @@ impl GroupRow {
 
 impl CellGroup {
     fn of(group: &'static str, trials: &[SkyTrial], belongs: CellBelongs) -> Self {
-        let cells: Vec<&CellRow> = trials
+        let cells: Vec<&TrialCellRow> = trials
             .iter()
             .flat_map(|trial| {
-                let inside = move |cell: &&CellRow| belongs(&trial.frame, cell);
+                let inside = move |cell: &&TrialCellRow| belongs(&trial.frame, cell);
                 trial.cells.iter().filter(inside)
             })
             .collect();
-        let brightness = Errors::of(cells.iter().map(|cell| {
+        let brightness = ErrorSamples::of(cells.iter().map(|cell| {
             let error = cell.mag_arcsec2? - cell.true_mag_arcsec2;
             Some((error, cell.sigma_mag?))
         }));
-        let clouds = Errors::of(cells.iter().map(|cell| {
+        let clouds = ErrorSamples::of(cells.iter().map(|cell| {
             let error = cell.clouds_mag? - cell.true_clouds_mag;
             Some((error, cell.clouds_sigma_mag?))
         }));
-        let limit = Errors::of(cells.iter().map(|cell| {
+        let limit = ErrorSamples::of(cells.iter().map(|cell| {
             let error = cell.limit_vmag? - cell.true_limit_vmag?;
             Some((error, cell.limit_sigma_mag?))
         }));
@@ -226,9 +226,9 @@ impl CellGroup {
 }
 
 /// Errors with their stated standard errors.
-struct Errors(Vec<(f64, f64)>);
+struct ErrorSamples(Vec<(f64, f64)>);
 
-impl Errors {
+impl ErrorSamples {
     fn of(errors: impl Iterator<Item = Option<(f64, f64)>>) -> Self {
         Self(errors.flatten().collect())
     }
@@ -265,7 +265,7 @@ fn rounded(mag: f64) -> f64 {
 }
 
 /// The area under the curve of true over false positives; `None` without cells of both kinds.
-fn area_under_curve<'a>(cells: impl Iterator<Item = &'a CellRow>) -> Option<f64> {
+fn area_under_curve<'a>(cells: impl Iterator<Item = &'a TrialCellRow>) -> Option<f64> {
     let told = cells.filter_map(|cell| {
         let is_clouded = cell.true_clouds_mag > CLOUDED_MAG;
         let is_either = is_clouded || cell.true_clouds_mag < UNCLOUDED_MAG;
@@ -290,12 +290,12 @@ impl ClearTenth {
     fn of(tenth: usize, trials: &[SkyTrial]) -> Option<Self> {
         let cells = trials.iter().flat_map(|trial| &trial.cells);
         let told = cells.filter_map(|cell| Some((cell.clear?, cell)));
-        let is_inside = |(clear, _): &(f64, &CellRow)| {
+        let is_inside = |(clear, _): &(f64, &TrialCellRow)| {
             ((clear * TENTHS as f64) as usize).min(TENTHS - 1) == tenth
         };
-        let inside: Vec<(f64, &CellRow)> = told.filter(is_inside).collect();
+        let inside: Vec<(f64, &TrialCellRow)> = told.filter(is_inside).collect();
         let cells = inside.len();
-        let mean = |of: &dyn Fn(f64, &CellRow) -> f64| {
+        let mean = |of: &dyn Fn(f64, &TrialCellRow) -> f64| {
             let sum: f64 = inside.iter().map(|(clear, cell)| of(*clear, cell)).sum();
             rounded(sum / cells as f64)
         };
@@ -316,8 +316,8 @@ impl ClearTenth {
 mod tests {
     use super::*;
 
-    fn cell(clear: f64, true_clouds_mag: f64) -> CellRow {
-        CellRow {
+    fn cell(clear: f64, true_clouds_mag: f64) -> TrialCellRow {
+        TrialCellRow {
             frame: 0,
             altitude_deg: 45.0,
             azimuth_deg: 0.0,
@@ -350,10 +350,10 @@ mod tests {
 
     #[test]
     fn pulls_are_errors_over_stated_errors() {
-        let errors = Errors::of([Some((0.03, 0.01)), None, Some((-0.01, 0.01))].into_iter());
+        let errors = ErrorSamples::of([Some((0.03, 0.01)), None, Some((-0.01, 0.01))].into_iter());
         assert_eq!(errors.mean(), Some(0.01));
         assert_eq!(errors.sd(), Some(0.02));
         assert_eq!(errors.pull(), Some(2.24));
-        assert_eq!(Errors(Vec::new()).rms(), None);
+        assert_eq!(ErrorSamples(Vec::new()).rms(), None);
     }
 }

@@ -1,7 +1,7 @@
 //! A frame, and its cells, compared with the truth.
 
-use super::conditions::Conditions;
-use super::truth::{TrueCell, Truth};
+use super::conditions::TrialConditions;
+use super::truth::{TrueCell, TrueNightSky};
 use crate::base::format::to_decimals;
 use crate::pipeline::Solution;
 use crate::sky::{Place, SkyCell, SkyMap};
@@ -19,15 +19,15 @@ const SURELY_CLEAR: f64 = 0.9;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkyTrial {
     /// The frame.
-    pub frame: FrameRow,
+    pub frame: TrialFrameRow,
     /// Its cells above 10° of altitude.
-    pub cells: Vec<CellRow>,
+    pub cells: Vec<TrialCellRow>,
 }
 
 /// What was drawn of a frame, and what was measured. Magnitudes are V; sigmas are stated errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "docs/sky.md describes the columns")]
-pub struct FrameRow {
+pub struct TrialFrameRow {
     pub frame: u64,
     pub date: String,
     pub sky_mag_arcsec2: f64,
@@ -61,7 +61,7 @@ pub struct FrameRow {
 /// What was drawn of a cell, and what was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "docs/sky.md describes the columns")]
-pub struct CellRow {
+pub struct TrialCellRow {
     pub frame: u64,
     pub altitude_deg: f64,
     pub azimuth_deg: f64,
@@ -83,9 +83,9 @@ pub struct CellRow {
 impl SkyTrial {
     pub(super) fn new(
         number: u64,
-        conditions: &Conditions,
+        conditions: &TrialConditions,
         solution: &Solution,
-        truth: &Truth,
+        truth: &TrueNightSky,
     ) -> Self {
         let sky = solution.sky.as_ref();
         let cells = sky.map_or(&[][..], |sky| &sky.cells);
@@ -100,23 +100,28 @@ impl SkyTrial {
                 known_sr += cell.solid_angle_sr;
                 behind_sr += cell.solid_angle_sr * drawn.cloud_share;
             }
-            rows.extend(CellRow::new(number, cell, &drawn));
+            rows.extend(TrialCellRow::new(number, cell, &drawn));
         }
         rows.retain(|row| row.altitude_deg > LOWEST_DEG);
         let true_cloud_share = (known_sr > 0.0).then(|| decimals(behind_sr / known_sr));
         Self {
-            frame: FrameRow {
+            frame: TrialFrameRow {
                 true_cloud_share,
                 limit_difference_mag: mean_limit_difference(&rows),
-                ..FrameRow::new(number, conditions, solution, truth)
+                ..TrialFrameRow::new(number, conditions, solution, truth)
             },
             cells: rows,
         }
     }
 }
 
-impl FrameRow {
-    fn new(number: u64, conditions: &Conditions, solution: &Solution, truth: &Truth) -> Self {
+impl TrialFrameRow {
+    fn new(
+        number: u64,
+        conditions: &TrialConditions,
+        solution: &Solution,
+        truth: &TrueNightSky,
+    ) -> Self {
         let sky = solution.sky.as_ref();
         let zenith = sky
             .and_then(|sky| sky.zenith)
@@ -161,7 +166,7 @@ impl FrameRow {
     }
 }
 
-impl CellRow {
+impl TrialCellRow {
     fn new(frame: u64, cell: &SkyCell, drawn: &TrueCell) -> Option<Self> {
         let Place::Horizon {
             altitude_deg,
@@ -195,7 +200,7 @@ impl CellRow {
 }
 
 /// Mean of measured minus expected limits in clear cells.
-fn mean_limit_difference(cells: &[CellRow]) -> Option<f64> {
+fn mean_limit_difference(cells: &[TrialCellRow]) -> Option<f64> {
     let clear = cells.iter().filter(|cell| cell.clear > Some(SURELY_CLEAR));
     let differences: Vec<f64> = clear.filter_map(|cell| cell.limit_difference_mag).collect();
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;

@@ -1,6 +1,6 @@
 //! The sky that was drawn, as its cells and a meter see it.
 
-use super::conditions::Conditions;
+use super::conditions::TrialConditions;
 use crate::base::coords::{Camera, PixelPoint, UnitVector};
 use crate::base::statistics::normal_cdf;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
@@ -20,7 +20,7 @@ const METER_DEG: f64 = 20.0;
 const METER_REACH_DEG: f64 = 30.0;
 
 /// The sky that was drawn.
-pub(super) struct Truth<'a> {
+pub(super) struct TrueNightSky<'a> {
     sky: TrueSky<'a>,
     simulator: &'a Simulator<'a>,
     pointing: &'a Pointing,
@@ -68,12 +68,12 @@ pub(super) struct TrueCell {
     pub limit_vmag: f64,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> TrueNightSky<'a> {
     /// The sky of a frame.
     pub(super) fn new(
         simulator: &'a Simulator<'a>,
         pointing: &'a Pointing,
-        conditions: &Conditions,
+        conditions: &TrialConditions,
         site: Site,
         spot_sigma_px: f64,
     ) -> Self {

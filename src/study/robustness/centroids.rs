@@ -1,6 +1,6 @@
 //! Simulated centroids, and the truth about them.
 
-use super::protocol::{Mirrored, Protocol};
+use super::protocol::{Mirrored, TrialProtocol};
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::{CameraModel, focal_length_px};
@@ -27,7 +27,7 @@ pub struct SimulatedCentroids {
 
 impl SimulatedCentroids {
     /// Draws a list according to `protocol`.
-    pub fn draw(protocol: &Protocol, indexed: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
+    pub fn draw(protocol: &TrialProtocol, indexed: &IndexedCatalog, rng: &mut ChaCha8Rng) -> Self {
         let icrs_to_camera = random_rotation(rng);
         let mirrored = match protocol.mirrored {
             Mirrored::Never => false,
@@ -65,14 +65,14 @@ impl SimulatedCentroids {
 }
 
 /// A simulated centroid.
-struct Centroid {
+struct SimulatedCentroid {
     position: PixelPoint,
     v_mag: f64,
     /// Its catalogue star; `None` for a false star.
     star: Option<StarIndex>,
 }
 
-impl Centroid {
+impl SimulatedCentroid {
     fn listed(&self, photometry: Photometry) -> ListedCentroid {
         /// Flux of a star of V = 0 in lists of instrumental magnitudes (arbitrary).
         const FLUX_OF_V_0: f64 = 1e8;
@@ -89,12 +89,12 @@ impl Centroid {
 
 /// The catalogue stars on the frame above the limit, with true positions and observed magnitudes.
 fn observed_stars(
-    protocol: &Protocol,
+    protocol: &TrialProtocol,
     indexed: &IndexedCatalog,
     camera: &CameraModel,
     icrs_to_camera: &Rotation<Icrs, Camera>,
     rng: &mut ChaCha8Rng,
-) -> Vec<Centroid> {
+) -> Vec<SimulatedCentroid> {
     /// Stars fainter than the limit by this many standard deviations may be observed above it.
     const MARGIN_SIGMAS: f64 = 4.0;
     let limit_v_mag = limiting_v_mag(protocol, camera, indexed);
@@ -112,7 +112,7 @@ fn observed_stars(
         let pixel = camera.pixel_of(&icrs_to_camera.apply(&star.direction));
         let position = pixel.filter(|pixel| camera.contains(pixel))?;
         let v_mag = f64::from(star.v_mag) + protocol.mag_sigma * normal(rng);
-        (v_mag <= limit_v_mag).then_some(Centroid {
+        (v_mag <= limit_v_mag).then_some(SimulatedCentroid {
             position,
             v_mag,
             star: Some(index),
@@ -122,25 +122,33 @@ fn observed_stars(
 }
 
 /// The stars that are not missing, with centroid errors.
-fn listed_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -> Vec<Centroid> {
-    let listed = |star: &Centroid| {
+fn listed_stars(
+    protocol: &TrialProtocol,
+    stars: &[SimulatedCentroid],
+    rng: &mut ChaCha8Rng,
+) -> Vec<SimulatedCentroid> {
+    let listed = |star: &SimulatedCentroid| {
         let [dx, dy] = [normal(rng), normal(rng)].map(|n| protocol.centroid_sigma_px * n);
         let position = PixelPoint::new(star.position.x + dx, star.position.y + dy);
-        (!rng.random_bool(protocol.missing)).then_some(Centroid { position, ..*star })
+        (!rng.random_bool(protocol.missing)).then_some(SimulatedCentroid { position, ..*star })
     };
     stars.iter().filter_map(listed).collect()
 }
 
 /// False stars, uniform over the frame, each as bright as a random star of this frame, and those that
 /// are brighter than all stars.
-fn false_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) -> Vec<Centroid> {
+fn false_stars(
+    protocol: &TrialProtocol,
+    stars: &[SimulatedCentroid],
+    rng: &mut ChaCha8Rng,
+) -> Vec<SimulatedCentroid> {
     /// Brighter false stars are so much brighter than the brightest star, at most.
     const MOST_BRIGHTER_MAG: f64 = 2.0;
     let wanted = protocol.false_stars * stars.len() as f64;
     let count = wanted as usize + usize::from(rng.random_bool(wanted.fract()));
     let brightest = stars.iter().map(|star| star.v_mag);
     let brightest = brightest.fold(f64::INFINITY, f64::min);
-    let mut false_star = |number: usize| Centroid {
+    let mut false_star = |number: usize| SimulatedCentroid {
         position: PixelPoint::new(
             rng.random_range(0.0..protocol.width_px as f64) - 0.5,
             rng.random_range(0.0..protocol.height_px as f64) - 0.5,
@@ -161,7 +169,7 @@ fn false_stars(protocol: &Protocol, stars: &[Centroid], rng: &mut ChaCha8Rng) ->
 }
 
 /// The magnitude limit that gives the requested mean number of stars on a frame.
-fn limiting_v_mag(protocol: &Protocol, camera: &CameraModel, indexed: &IndexedCatalog) -> f64 {
+fn limiting_v_mag(protocol: &TrialProtocol, camera: &CameraModel, indexed: &IndexedCatalog) -> f64 {
     let area_sq_deg = camera.solid_angle_sr() * DEG_PER_RAD.powi(2);
     indexed.magnitude_of_density(protocol.mean_stars / area_sq_deg)
 }

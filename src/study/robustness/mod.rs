@@ -30,8 +30,8 @@ mod trial;
 pub use answers::{Answer, Answers};
 pub use centroids::{SimulatedCentroids, random_rotation};
 pub use interval::Interval;
-pub use protocol::{Mirrored, Protocol};
-pub use table::{Case, CaseResult, VariedParameter, standard_cases};
+pub use protocol::{Mirrored, TrialProtocol};
+pub use table::{CaseResult, ProtocolCase, VariedParameter, standard_cases};
 pub use trial::{TrialResult, TrialResults};
 
 use crate::ephemeris::places::StarPlaces;
@@ -44,7 +44,7 @@ use std::time::Instant;
 /// each.
 pub fn run(
     indexed: &IndexedCatalog,
-    protocol: &Protocol,
+    protocol: &TrialProtocol,
     trials: u64,
     seed: u64,
     done: &(dyn Fn() + Sync),
@@ -56,7 +56,7 @@ pub fn run(
 /// Runs only the trial number `trial`.
 pub fn run_one(
     indexed: &IndexedCatalog,
-    protocol: &Protocol,
+    protocol: &TrialProtocol,
     seed: u64,
     trial: u64,
 ) -> TrialResult {

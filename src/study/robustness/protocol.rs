@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// The simulated frames of a trial, and the priors of their identification.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Protocol {
+pub struct TrialProtocol {
     /// Horizontal field of view, in degrees.
     pub fov_deg: f64,
     /// Columns of the frame.
@@ -47,7 +47,7 @@ pub enum Mirrored {
     Always,
 }
 
-impl Default for Protocol {
+impl Default for TrialProtocol {
     /// A field of 10° with typical errors, known to a tenth.
     fn default() -> Self {
         Self {
@@ -67,7 +67,7 @@ impl Default for Protocol {
     }
 }
 
-impl Protocol {
+impl TrialProtocol {
     /// The priors of the identification: the scale, off by a random part of its stated error.
     pub(super) fn priors(&self, rng: &mut ChaCha8Rng) -> Priors {
         let scale = self.scale_error.map(|tolerance| {

@@ -1,6 +1,6 @@
 //! The standard table, sweeps over one parameter, and their results.
 
-use super::protocol::{Mirrored, Protocol};
+use super::protocol::{Mirrored, TrialProtocol};
 use super::trial::TrialResults;
 use crate::identify::Photometry;
 use serde::Serialize;
@@ -12,22 +12,22 @@ const VARIED_FOV_DEG: f64 = 10.0;
 
 /// A protocol with its label in a table.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Case {
+pub struct ProtocolCase {
     /// Label of the case.
     pub label: String,
     /// The protocol.
-    pub protocol: Protocol,
+    pub protocol: TrialProtocol,
 }
 
 /// The standard table: `base` at five fields of view, then with one parameter worse at a time.
-pub fn standard_cases(base: &Protocol) -> Vec<Case> {
-    let case = |label: &str, change: &dyn Fn(&mut Protocol)| {
-        let mut protocol = Protocol {
+pub fn standard_cases(base: &TrialProtocol) -> Vec<ProtocolCase> {
+    let case = |label: &str, change: &dyn Fn(&mut TrialProtocol)| {
+        let mut protocol = TrialProtocol {
             fov_deg: VARIED_FOV_DEG,
             ..*base
         };
         change(&mut protocol);
-        Case {
+        ProtocolCase {
             label: label.to_owned(),
             protocol,
         }
@@ -111,7 +111,7 @@ impl VariedParameter {
 
     /// `protocol` with this value of the parameter.
     #[must_use]
-    pub fn set(self, protocol: &Protocol, value: f64) -> Protocol {
+    pub fn set(self, protocol: &TrialProtocol, value: f64) -> TrialProtocol {
         let mut changed = *protocol;
         match self {
             Self::FieldOfView => changed.fov_deg = value,
@@ -160,7 +160,7 @@ pub struct CaseResult {
 impl CaseResult {
     /// The result of `case` from all its trials. Only trials with at least `least_true_stars` count
     /// in the rates.
-    pub fn new(case: &Case, all: &TrialResults, least_true_stars: usize) -> Self {
+    pub fn new(case: &ProtocolCase, all: &TrialResults, least_true_stars: usize) -> Self {
         let counted = all.with_true_stars(least_true_stars);
         let (answers, of_all) = (counted.answers(), all.answers());
         let right = answers.right_interval();

@@ -1,8 +1,8 @@
 //! Compares the results of one frame with the truth.
 
 use super::light::LightMap;
-use super::record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord};
-use super::validator::{SimulatedFrame, Validator};
+use super::record::{BEYOND_LIMIT_MAG, FrameRecord, NameResult, RowKind, StarRecord};
+use super::validator::{UnprocessedFrame, Validator};
 use crate::base::coords::small_turn_rad;
 use crate::base::format::{to_decimals, to_significant};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
@@ -20,7 +20,7 @@ use std::collections::{HashMap, HashSet};
 pub(super) struct Evaluation<'a> {
     validator: &'a Validator<'a>,
     number: u64,
-    simulated: &'a SimulatedFrame,
+    simulated: &'a UnprocessedFrame,
     solution: &'a Solution,
     light: LightMap<'a>,
     found: Option<&'a Identification>,
@@ -46,7 +46,7 @@ impl<'a> Evaluation<'a> {
     pub(super) fn new(
         validator: &'a Validator<'a>,
         number: u64,
-        simulated: &'a SimulatedFrame,
+        simulated: &'a UnprocessedFrame,
         solution: &'a Solution,
     ) -> Self {
         let found = solution.outcome.identification();
@@ -221,9 +221,11 @@ impl<'a> Evaluation<'a> {
             flux_e: flux_e.map(significant),
             sigma_flux_e: sigma_flux_e.map(significant),
             named: match self.names.get(&source) {
-                None => Named::No,
-                Some(name) if star.is_some_and(|star| star.catalog == Some(*name)) => Named::Right,
-                Some(_) => Named::Wrong,
+                None => NameResult::No,
+                Some(name) if star.is_some_and(|star| star.catalog == Some(*name)) => {
+                    NameResult::Right
+                }
+                Some(_) => NameResult::Wrong,
             },
             ..row
         }

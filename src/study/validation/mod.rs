@@ -36,14 +36,14 @@ mod validator;
 
 pub use light::LightMap;
 pub use parameter_study::{StudyParameter, StudyRow};
-pub use record::{BEYOND_LIMIT_MAG, FrameRecord, Named, RowKind, StarRecord, TableRow};
+pub use record::{BEYOND_LIMIT_MAG, FrameRecord, NameResult, RowKind, StarRecord, TableRow};
 pub use suite::{HARD_SUITE, HardCase, HardRow};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,
     CompletenessSummary, DetectionSummary, DifferenceSummary, Histogram, IdentificationBin,
-    IdentificationSummary, Pull, PullSummary, Quantiles, RunFacts, Summary,
+    IdentificationSummary, Pull, PullSummary, Quantiles, RunFacts, ValidationSummary,
 };
-pub use validator::{Protocol, Validator, draw};
+pub use validator::{ValidationProtocol, Validator, draw};
 
 use crate::pipeline::{Workspace, solve_frame};
 use crate::study::StudyError;

@@ -1,6 +1,6 @@
 //! Studies over one parameter: a run for each of its values, and a row for each run.
 
-use super::summary::Summary;
+use super::summary::ValidationSummary;
 use crate::base::format::five_digits;
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::focal_length_px;
@@ -110,7 +110,12 @@ pub struct StudyRow {
 
 impl StudyRow {
     /// The row of a run with this value of the parameter.
-    pub fn new(parameter: StudyParameter, value: f64, spacing: Spacing, summary: &Summary) -> Self {
+    pub fn new(
+        parameter: StudyParameter,
+        value: f64,
+        spacing: Spacing,
+        summary: &ValidationSummary,
+    ) -> Self {
         let identification = &summary.identification.all;
         let (detection, completeness) = (&summary.detection, &summary.completeness);
         let attitude = summary.attitude.as_ref();

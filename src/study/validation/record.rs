@@ -117,7 +117,7 @@ table_row! {
         sigma_y: Option<f64>, "pix", "stat.error;pos.cartesian.y", "standard error of y";
         flux_e: Option<f64>, "electron", "phot.count", "measured flux";
         sigma_flux_e: Option<f64>, "electron", "stat.error;phot.count", "standard error of flux_e";
-        named: Named, "", "meta.code", "right, wrong or no";
+        named: NameResult, "", "meta.code", "right, wrong or no";
     }
 }
 
@@ -137,7 +137,7 @@ pub enum RowKind {
 /// Whether a detection was named correctly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Named {
+pub enum NameResult {
     /// Named as the true star.
     Right,
     /// Named as another star.
@@ -158,10 +158,10 @@ field! {
         RowKind::Blend => "blend",
         RowKind::False => "false",
     }.to_owned();
-    Named => Text, |value| match value {
-        Named::Right => "right",
-        Named::Wrong => "wrong",
-        Named::No => "no",
+    NameResult => Text, |value| match value {
+        NameResult::Right => "right",
+        NameResult::Wrong => "wrong",
+        NameResult::No => "no",
     }.to_owned();
 }
 

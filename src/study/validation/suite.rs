@@ -1,8 +1,8 @@
 //! The hard suite: lenses, spots and detectors that are not those that the pipeline assumes, a run
 //! for each, and a row for each run.
 
-use super::summary::Summary;
-use super::validator::Protocol;
+use super::summary::ValidationSummary;
+use super::validator::ValidationProtocol;
 use crate::camera::data_sheet::SpotForm;
 use crate::ephemeris::observer::Site;
 use crate::model::simulate::camera_of;
@@ -15,12 +15,12 @@ pub struct HardCase {
     pub name: &'static str,
     /// What is hard about it.
     pub what: &'static str,
-    change: fn(&mut Protocol),
+    change: fn(&mut ValidationProtocol),
 }
 
 impl HardCase {
     /// What is simulated.
-    pub fn protocol(&self, base: &Protocol) -> Protocol {
+    pub fn protocol(&self, base: &ValidationProtocol) -> ValidationProtocol {
         let mut protocol = base.clone();
         (self.change)(&mut protocol);
         protocol
@@ -156,7 +156,7 @@ pub const HARD_SUITE: [HardCase; 20] = [
 
 /// Sets the terms of the lens, in thousandths of half of the diagonal: of r³, r⁵ and r⁷, the axis in x and y,
 /// decentring, stretch and skew. Those that are not given are 0.
-fn lens(run: &mut Protocol, thousandths: &[f64]) {
+fn lens(run: &mut ValidationProtocol, thousandths: &[f64]) {
     let camera = &mut run.setup.scenario.camera;
     let unit_px = camera_of(camera).radius_px() / 1000.0;
     let made = &mut camera.imperfections;
@@ -207,7 +207,7 @@ pub struct HardRow {
 
 impl HardRow {
     /// The row of a case.
-    pub fn new(case: &HardCase, summary: &Summary) -> Self {
+    pub fn new(case: &HardCase, summary: &ValidationSummary) -> Self {
         let identification = &summary.identification.all;
         let attitude = summary.attitude.as_ref();
         let pulls = &summary.pulls;
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn each_case_can_be_simulated_and_has_a_name_of_its_own() {
         for preset in Preset::ALL {
-            let base = Protocol {
+            let base = ValidationProtocol {
                 setup: Setup {
                     scenario: Scenario::of(preset),
                     scene: Scene::default(),

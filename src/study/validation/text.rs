@@ -1,7 +1,8 @@
 //! Summary as text for people.
 
 use super::summary::{
-    AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, PullSummary, Quantiles, Summary,
+    AttitudeSummary, DifferenceSummary, IdentificationBin, Pull, PullSummary, Quantiles,
+    ValidationSummary,
 };
 use std::fmt::Write as _;
 
@@ -15,7 +16,7 @@ Pulls: errors in units of their stated standard errors
   where true                       0        1    4.55 %    0.27 %    0.00 %
 ";
 
-impl Summary {
+impl ValidationSummary {
     /// The summary as text of several lines, each with a line end.
     pub fn to_text(&self) -> String {
         let facts = &self.facts;

@@ -5,7 +5,7 @@ use crate::base::statistics::normal_cdf;
 use crate::model::sensitivity::{Budget, CramerRao, Scenario};
 
 /// Spots of a scenario and their noise.
-pub(super) struct Theory {
+pub(super) struct SpotTheory {
     sigma_px: f64,
     has_smear: bool,
     noise_e: f64,
@@ -25,7 +25,7 @@ pub(super) struct StarTheory {
     pub bound: Option<CramerRao>,
 }
 
-impl Theory {
+impl SpotTheory {
     pub(super) fn of(scenario: &Scenario, budget: &Budget) -> Self {
         let sheet = &scenario.camera;
         let end_e = (sheet.full_scale_adu() - sheet.bias_adu) * sheet.gain_e_per_adu;
@@ -80,7 +80,7 @@ mod tests {
         let mut scenario = Scenario::of(Preset::NanosatTracker);
         scenario.camera.spot_sigma_px = 1.0;
         let budget = Budget::new(&scenario);
-        let theory = Theory::of(&scenario, &budget);
+        let theory = SpotTheory::of(&scenario, &budget);
         // 13.6 pixels on average over positions, from an independent computation.
         let places = (0..100).map(|i| [i % 10, i / 10].map(|n| 0.05 + 0.1 * f64::from(n)));
         let pixels = places.map(|[x, y]| {
@@ -95,7 +95,7 @@ mod tests {
     fn a_bright_star_fills_its_pixel_and_a_smeared_one_has_no_bound() {
         let mut scenario = Scenario::of(Preset::Experiment1);
         let theory = |scenario: &Scenario, electrons| {
-            let theory = Theory::of(scenario, &Budget::new(scenario));
+            let theory = SpotTheory::of(scenario, &Budget::new(scenario));
             theory.of_star(&PixelPoint::new(3.2, 7.9), electrons)
         };
         let full_e = scenario.camera.full_well_e;

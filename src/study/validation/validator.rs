@@ -1,7 +1,7 @@
 //! What all frames of a validation have in common, and the simulation of each.
 
 use super::summary::RunFacts;
-use super::theory::Theory;
+use super::theory::SpotTheory;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::detect::DetectConfig;
@@ -20,7 +20,7 @@ use rand::Rng;
 
 /// What is simulated, and what the pipeline knows about it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Protocol {
+pub struct ValidationProtocol {
     /// Camera, sky, exposure and scene.
     pub setup: Setup,
     /// Whether the pipeline is given the camera's data sheet, and thereby the scale.
@@ -34,16 +34,16 @@ pub struct Protocol {
 /// Simulates and processes the frames of a [`Protocol`].
 pub struct Validator<'a> {
     pub(super) context: Context<'a>,
-    pub(super) protocol: Protocol,
+    pub(super) protocol: ValidationProtocol,
     pub(super) simulator: Simulator<'a>,
     pub(super) budget: Budget,
     pub(super) detector: Detector,
-    pub(super) theory: Theory,
+    pub(super) theory: SpotTheory,
     places: StarPlaces,
 }
 
 /// A simulated frame, not yet processed.
-pub(super) struct SimulatedFrame {
+pub(super) struct UnprocessedFrame {
     pub(super) frame: Frame<'static>,
     pub(super) truth: Truth,
     pub(super) pointing: Pointing,
@@ -75,7 +75,10 @@ impl<'a> Validator<'a> {
     ///
     /// # Errors
     /// [`StudyError::Scenario`]; [`StudyError::NoLimit`] if there is no limit to predict.
-    pub fn new(indexed: &'a IndexedCatalog<'a>, protocol: &Protocol) -> Result<Self, StudyError> {
+    pub fn new(
+        indexed: &'a IndexedCatalog<'a>,
+        protocol: &ValidationProtocol,
+    ) -> Result<Self, StudyError> {
         let Setup { scenario, scene } = &protocol.setup;
         protocol.setup.check()?;
         let simulator = Simulator::new(scenario, scene, indexed.catalog().stars())?;
@@ -110,7 +113,7 @@ impl<'a> Validator<'a> {
                 ..Context::new(indexed)
             },
             places: StarPlaces::at(&date, protocol.site, None),
-            theory: Theory::of(scenario, &budget),
+            theory: SpotTheory::of(scenario, &budget),
             protocol: protocol.clone(),
             budget,
             detector,
@@ -149,7 +152,7 @@ impl<'a> Validator<'a> {
     }
 
     /// Simulates the frame with this number.
-    pub(super) fn simulate(&self, number: u64) -> Result<SimulatedFrame, StudyError> {
+    pub(super) fn simulate(&self, number: u64) -> Result<UnprocessedFrame, StudyError> {
         let (seed, drawn) = self.draw(number);
         let places = self.places;
         let zenith = places.zenith();
@@ -159,7 +162,7 @@ impl<'a> Validator<'a> {
             places,
         };
         let (frame, truth) = self.simulator.frame(&pointing, seed)?;
-        Ok(SimulatedFrame {
+        Ok(UnprocessedFrame {
             frame,
             truth,
             pointing,

@@ -2,7 +2,7 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{Guess, Sample, camera_like};
+use super::super::fit::{LensGuess, LensSample, camera_like};
 use super::super::yaml::{Document, Matrix};
 use super::{CvLens, CvModel};
 use crate::CameraModel;
@@ -178,7 +178,7 @@ fn camera_of(lens: &CvLens, tolerance_px: f64) -> Result<CameraModel, FormatErro
     .with_projection(Projection::Equidistant)
     .limited_to(lens.max_angle_rad);
     let distortion = exact.distortion();
-    let guess = Guess {
+    let guess = LensGuess {
         camera,
         axis_px: distortion.map_or([0.0; 2], |d| d.axis_offset_px()),
         stretch_px: distortion.map_or(0.0, |d| d.coefficients_px().get(7).copied().unwrap_or(0.0)),
@@ -319,7 +319,7 @@ fn angles(lens: &CvLens) -> impl Iterator<Item = f64> {
 }
 
 /// What the lens images up to an angle from its axis, on circles about it.
-fn polar_samples(lens: &CvLens, to_rad: f64, (circles, rays): (u32, u32)) -> Vec<Sample> {
+fn polar_samples(lens: &CvLens, to_rad: f64, (circles, rays): (u32, u32)) -> Vec<LensSample> {
     let at = |circle: u32, ray: u32| {
         // Closer together at the border.
         let angle_rad = to_rad * libm::sin(FRAC_PI_2 * f64::from(circle) / f64::from(circles));
@@ -327,7 +327,7 @@ fn polar_samples(lens: &CvLens, to_rad: f64, (circles, rays): (u32, u32)) -> Vec
         let (sin_ray, cos_ray) = libm::sincos(TAU * f64::from(ray) / f64::from(rays));
         let direction = Vector3::new(sin * cos_ray, sin * sin_ray, cos);
         let pixel = lens.image(&direction)?;
-        Some(Sample { direction, pixel })
+        Some(LensSample { direction, pixel })
     };
     (0..=circles)
         .flat_map(|circle| (0..rays).filter_map(move |ray| at(circle, ray)))

@@ -2,7 +2,7 @@
 //! 0, 0, K, D)` and `cv2.fisheye.projectPoints(WIDE_DIRECTIONS, 0, 0, K, D)`.
 
 use super::super::FormatError;
-use super::super::fit::{Sample, image_in_lens, samples};
+use super::super::fit::{LensSample, image_in_lens, samples};
 use super::read::from_opencv_yaml_within;
 use super::*;
 use crate::CameraModel;
@@ -193,7 +193,7 @@ fn cameras() -> Vec<CameraModel> {
 
 /// The largest distance between two cameras' pixels of the same direction in camera axes.
 fn largest_difference_px(camera: &CameraModel, other: &CameraModel) -> f64 {
-    let difference_px = |sample: Sample| {
+    let difference_px = |sample: LensSample| {
         let pixel = PixelPoint::new(sample.pixel[0], sample.pixel[1]);
         let direction = camera.direction_of(&pixel).unwrap();
         other.pixel_of(&direction).unwrap().distance_to(&pixel)

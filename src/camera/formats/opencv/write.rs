@@ -2,7 +2,7 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, largest_error_px, samples};
+use super::super::fit::{CHECK_POINTS, FIT_POINTS, LensSample, largest_error_px, samples};
 use super::super::yaml::{number, write_matrix};
 use super::{CvLens, CvModel};
 use crate::CameraModel;
@@ -167,10 +167,10 @@ fn without_irregularities(camera: &CameraModel) -> (CvLens, bool) {
 }
 
 /// The lens with `count` coefficients that is most like `fitted`. The axes of a pinhole are free to turn.
-fn fit(start: &CvLens, count: usize, fitted: &[Sample]) -> Option<CvLens> {
+fn fit(start: &CvLens, count: usize, fitted: &[LensSample]) -> Option<CvLens> {
     const FIRST: usize = 7;
     let is_pinhole = start.model == CvModel::Pinhole;
-    let far = |sample: &Sample| {
+    let far = |sample: &LensSample| {
         let sine = libm::hypot(sample.direction.x, sample.direction.y);
         if is_pinhole {
             sine / sample.direction.z

@@ -19,14 +19,14 @@ use std::f64::consts::TAU;
 
 /// A kind of distortion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum DistortionKind {
     /// A number of radial coefficients, of even powers or of all.
     Radial { terms: usize, all_powers: bool },
     /// Polynomials with this many coefficients.
     Polynomial { terms: usize },
 }
 
-impl Kind {
+impl DistortionKind {
     const ALL: [(&'static str, Self); 10] = [
         ("poly3+radial", Self::Polynomial { terms: 12 }),
         ("poly3+radial3", Self::Polynomial { terms: 13 }),
@@ -76,7 +76,7 @@ pub(super) enum Warp {
 
 /// What a radial plate leaves out of its list of coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Left {
+pub(super) struct OmittedTerms {
     /// x₀ and y₀: the axis is half a pixel right of and below half the size.
     pub axis: bool,
     pub aspect: bool,
@@ -86,16 +86,16 @@ pub(super) struct Left {
 impl Warp {
     /// From the lists of a file; `None` if they are too short.
     pub(super) fn from_lists(
-        kind: Kind,
-        left: Left,
+        kind: DistortionKind,
+        left: OmittedTerms,
         size_px: [f64; 2],
         [x, y]: [&[f64]; 2],
     ) -> Option<Self> {
         match kind {
-            Kind::Polynomial { terms } => Some(Self::Polynomial {
+            DistortionKind::Polynomial { terms } => Some(Self::Polynomial {
                 along: [x.get(..terms)?.to_vec(), y.get(..terms)?.to_vec()],
             }),
-            Kind::Radial { terms, all_powers } => {
+            DistortionKind::Radial { terms, all_powers } => {
                 let mut rest = x.iter().copied();
                 let axis_px = if left.axis {
                     [0.5; 2]

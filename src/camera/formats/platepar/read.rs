@@ -2,10 +2,10 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{Guess, Sample, camera_like, grid};
+use super::super::fit::{LensGuess, LensSample, camera_like, grid};
 use super::super::pointing::Pointing;
-use super::super::sky::Sky;
-use super::plate::{Kind, Left, Warp};
+use super::super::sky::RmsSky;
+use super::plate::{DistortionKind, OmittedTerms, Warp};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, Rotation, UnitVector};
 use crate::base::epoch::ObservationDate;
@@ -42,14 +42,14 @@ pub fn from_platepar_within(
     })?;
     let file = File { json };
     let (kind, left, warp) = file.warp()?;
-    let plate = Plate {
+    let plate = PlateLens {
         size_px: file.size_px()?,
         scale_px_deg: file.within("F_scale", 1e-3, 1e7, "pixels per degree, above 0")?,
         warp,
     };
     let is_exact = match kind {
-        Kind::Radial { terms, all_powers } => terms <= 3 && !all_powers && left.asymmetry,
-        Kind::Polynomial { .. } => false,
+        DistortionKind::Radial { terms, all_powers } => terms <= 3 && !all_powers && left.asymmetry,
+        DistortionKind::Polynomial { .. } => false,
     };
     let exact = plate.exact_camera();
     exact.check_frame()?;
@@ -126,16 +126,16 @@ impl File {
         })
     }
 
-    fn warp(&self) -> Result<(Kind, Left, Warp), FormatError> {
+    fn warp(&self) -> Result<(DistortionKind, OmittedTerms, Warp), FormatError> {
         let name = self.json.get("distortion_type").and_then(Value::as_str);
         let name = name.unwrap_or("poly3+radial");
-        let kind = Kind::named(name).ok_or_else(|| FormatError::Value {
+        let kind = DistortionKind::named(name).ok_or_else(|| FormatError::Value {
             key: "distortion_type",
             found: format!("'{name}'"),
             expected: "poly3+radial to poly3+radial5, radial3-all to radial5-all or radial3-odd to \
                        radial9-odd",
         })?;
-        let left = Left {
+        let left = OmittedTerms {
             axis: self.flag("force_distortion_centre"),
             aspect: self.flag("equal_aspect"),
             asymmetry: !self.flag("asymmetry_corr"),
@@ -170,7 +170,7 @@ impl File {
             found: julian_date.to_string(),
             expected: "a Julian date of the years 1850 to 2100",
         })?;
-        let sky = Sky::new(
+        let sky = RmsSky::new(
             julian_date,
             lat_deg,
             site.lon_deg(),
@@ -196,13 +196,13 @@ impl File {
 }
 
 /// The lens of a platepar.
-struct Plate {
+struct PlateLens {
     size_px: [f64; 2],
     scale_px_deg: f64,
     warp: Warp,
 }
 
-impl Plate {
+impl PlateLens {
     /// The camera of a radial plate without asymmetry and with odd powers up to the seventh, and that of
     /// the same scale of other plates.
     fn exact_camera(&self) -> CameraModel {
@@ -271,14 +271,14 @@ impl Plate {
             found_px,
             expected_px: tolerance_px,
         };
-        let most = |angle: f64, sample: &Sample| {
+        let most = |angle: f64, sample: &LensSample| {
             let sine = libm::hypot(sample.direction.x, sample.direction.y);
             f64::max(angle, libm::atan2(sine, sample.direction.z))
         };
         // A frame sees a bit more than its samples.
         let farthest_rad = 1.02 * checked.iter().fold(0.0, most);
         let exact = self.exact_camera();
-        let guess = Guess {
+        let guess = LensGuess {
             camera: exact.limited_to(farthest_rad),
             axis_px: exact.distortion().map_or([0.0; 2], |d| d.axis_offset_px()),
             stretch_px: 0.0,
@@ -310,14 +310,14 @@ impl Plate {
     }
 
     /// What the frame sees, in the axes of the camera.
-    fn samples(&self, turn: &Matrix3<f64>, count: usize) -> Vec<Sample> {
+    fn samples(&self, turn: &Matrix3<f64>, count: usize) -> Vec<LensSample> {
         let [width_px, height_px] = self.size_px;
         grid(width_px, height_px, count)
             .filter_map(|pixel| {
                 let offset = [pixel[0] - 0.5 * width_px, pixel[1] - 0.5 * height_px];
                 let sky_px = self.inverted(offset)?;
                 let direction = self.direction(sky_px)?;
-                Some(Sample {
+                Some(LensSample {
                     direction: turn * direction,
                     pixel,
                 })

@@ -1,5 +1,5 @@
 use super::super::fit::samples;
-use super::super::sky::Sky;
+use super::super::sky::RmsSky;
 use super::super::{FormatError, Pointing, TOLERANCE_PX};
 use super::*;
 use crate::CameraModel;
@@ -45,7 +45,7 @@ fn pixel_of(
     star: &UnitVector<Icrs>,
 ) -> PixelPoint {
     let json: serde_json::Value = serde_json::from_str(text).unwrap();
-    let sky = Sky::new(
+    let sky = RmsSky::new(
         json["JD"].as_f64().unwrap(),
         pointing.site.lat_deg(),
         pointing.site.lon_deg(),

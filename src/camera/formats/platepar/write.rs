@@ -2,10 +2,10 @@
 
 use super::super::error::FormatError;
 use super::super::error::TOLERANCE_PX;
-use super::super::fit::{CHECK_POINTS, FIT_POINTS, Sample, samples};
+use super::super::fit::{CHECK_POINTS, FIT_POINTS, LensSample, samples};
 use super::super::pointing::Pointing;
-use super::super::sky::{Sky, sidereal_time_deg};
-use super::plate::{DEGREES, Kind, Warp};
+use super::super::sky::{RmsSky, sidereal_time_deg};
+use super::plate::{DEGREES, DistortionKind, Warp};
 use crate::CameraModel;
 use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::least_squares::levenberg_marquardt;
@@ -59,8 +59,8 @@ pub fn platepar(camera: &CameraModel, pointing: &Pointing) -> Result<String, For
 }
 
 /// A plate without its pointing.
-struct Plate {
-    kind: Kind,
+struct PlateModel {
+    kind: DistortionKind,
     scale_px_deg: f64,
     equal_aspect: bool,
     reverse: Warp,
@@ -70,7 +70,12 @@ struct Plate {
 
 type Entries = Vec<(&'static str, Value)>;
 
-fn json_of(camera: &CameraModel, pointing: &Pointing, julian_date: f64, plate: &Plate) -> String {
+fn json_of(
+    camera: &CameraModel,
+    pointing: &Pointing,
+    julian_date: f64,
+    plate: &PlateModel,
+) -> String {
     let mut entries = pointing_entries(camera, pointing, julian_date);
     entries.extend(plate_entries(camera, plate));
     entries.extend(other_entries());
@@ -83,7 +88,7 @@ fn json_of(camera: &CameraModel, pointing: &Pointing, julian_date: f64, plate: &
 
 fn pointing_entries(camera: &CameraModel, pointing: &Pointing, julian_date: f64) -> Entries {
     let site = &pointing.site;
-    let sky = Sky::new(julian_date, site.lat_deg(), site.lon_deg(), true);
+    let sky = RmsSky::new(julian_date, site.lat_deg(), site.lon_deg(), true);
     let attitude = pointing.icrs_to_camera;
     let attitude = attitude.turned_to(&sky.apparent(&attitude.boresight()));
     // In the axes of the date, and of the lens.
@@ -116,7 +121,7 @@ fn pointing_entries(camera: &CameraModel, pointing: &Pointing, julian_date: f64)
     ]
 }
 
-fn plate_entries(camera: &CameraModel, plate: &Plate) -> Entries {
+fn plate_entries(camera: &CameraModel, plate: &PlateModel) -> Entries {
     let size_px = [camera.width_px, camera.height_px];
     let [x_fwd, y_fwd] = plate.forward.to_lists(plate.equal_aspect, size_px);
     let [x_rev, y_rev] = plate.reverse.to_lists(plate.equal_aspect, size_px);
@@ -164,7 +169,7 @@ fn other_entries() -> Entries {
 fn rotation_from_horizon_deg(
     camera: &CameraModel,
     attitude: &Rotation<Icrs, Camera>,
-    sky: &Sky,
+    sky: &RmsSky,
 ) -> f64 {
     let at = |x: f64| {
         let pixel = PixelPoint::new(x, camera.height_px / 2.0);
@@ -199,14 +204,14 @@ fn fields_deg(camera: &CameraModel) -> [f64; 2] {
 
 /// A direction of the sky as an angle from the axis in degrees, along x and y, and its pixel as an offset
 /// from half the size.
-struct Point {
+struct PlatePoint {
     sky_deg: [f64; 2],
     pixel: [f64; 2],
 }
 
-fn points(camera: &CameraModel, count: usize) -> Vec<Point> {
+fn points(camera: &CameraModel, count: usize) -> Vec<PlatePoint> {
     let half_px = [camera.width_px / 2.0, camera.height_px / 2.0];
-    let point = |sample: Sample| Point {
+    let point = |sample: LensSample| PlatePoint {
         sky_deg: from_axis_deg(&sample.direction),
         pixel: [0, 1].map(|axis: usize| sample.pixel[axis] - half_px[axis]),
     };
@@ -224,7 +229,7 @@ fn from_axis_deg(direction: &Vector3<f64>) -> [f64; 2] {
 }
 
 /// The plate to write.
-fn best_plate(camera: &CameraModel) -> Option<Plate> {
+fn best_plate(camera: &CameraModel) -> Option<PlateModel> {
     let (fitted, checked) = (points(camera, FIT_POINTS), points(camera, CHECK_POINTS));
     let names = [
         "radial5-odd",
@@ -234,8 +239,8 @@ fn best_plate(camera: &CameraModel) -> Option<Plate> {
         "poly3+radial3",
         "poly3+radial5",
     ];
-    let mut best: Option<Plate> = None;
-    for kind in names.into_iter().filter_map(Kind::named) {
+    let mut best: Option<PlateModel> = None;
+    for kind in names.into_iter().filter_map(DistortionKind::named) {
         let Some(plate) = fit_plate(camera, kind, [&fitted, &checked]) else {
             continue;
         };
@@ -253,10 +258,14 @@ fn best_plate(camera: &CameraModel) -> Option<Plate> {
     best
 }
 
-fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2]) -> Option<Plate> {
+fn fit_plate(
+    camera: &CameraModel,
+    kind: DistortionKind,
+    [fitted, checked]: [&[PlatePoint]; 2],
+) -> Option<PlateModel> {
     let terms = camera.distortion().map_or(&[][..], |d| d.coefficients_px());
     let stretch_px = terms.get(7).copied().unwrap_or(0.0);
-    let is_polynomial = matches!(kind, Kind::Polynomial { .. });
+    let is_polynomial = matches!(kind, DistortionKind::Polynomial { .. });
     let equal_aspect = is_polynomial || stretch_px == 0.0;
     let scale_px_deg = camera.focal_length_px() * RAD_PER_DEG;
     let free = Free {
@@ -269,7 +278,7 @@ fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2])
         axis.x - camera.width_px / 2.0,
         axis.y - camera.height_px / 2.0,
     ];
-    let scaled = |point: &Point, scale: f64| point.sky_deg.map(|along| along * scale);
+    let scaled = |point: &PlatePoint, scale: f64| point.sky_deg.map(|along| along * scale);
     // The scale of a radial plate is found with the reverse distortion; that of a polynomial is in its
     // terms.
     let start = free.start([-axis_px[0], -axis_px[1]], axis_px);
@@ -306,14 +315,14 @@ fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2])
         true
     })?;
     let forward = free.warp(&found);
-    let error_px = |point: &Point| {
+    let error_px = |point: &PlatePoint| {
         let sky = scaled(point, scale_px_deg);
         let ([x, y], [u, v]) = (reverse.reverse(sky), forward.forward(point.pixel));
         let reverse_px = libm::hypot(x - point.pixel[0], y - point.pixel[1]);
         reverse_px.max(libm::hypot(u - sky[0], v - sky[1]))
     };
     let largest_px = checked.iter().map(error_px).fold(0.0, f64::max);
-    Some(Plate {
+    Some(PlateModel {
         kind,
         scale_px_deg,
         equal_aspect,
@@ -325,7 +334,7 @@ fn fit_plate(camera: &CameraModel, kind: Kind, [fitted, checked]: [&[Point]; 2])
 
 /// The distortion of a kind by parameters of the order of 1.
 struct Free {
-    kind: Kind,
+    kind: DistortionKind,
     equal_aspect: bool,
     half_px: f64,
 }
@@ -334,7 +343,7 @@ impl Free {
     /// The parameters of a plate without distortion. `shift_px` is x₀ and y₀ of polynomials.
     fn start(&self, shift_px: [f64; 2], axis_px: [f64; 2]) -> Vec<f64> {
         match self.kind {
-            Kind::Polynomial { terms } => {
+            DistortionKind::Polynomial { terms } => {
                 let along = shift_px.map(|px| {
                     let mut along = vec![0.0; terms];
                     along[0] = px / self.half_px;
@@ -342,7 +351,7 @@ impl Free {
                 });
                 along.concat()
             }
-            Kind::Radial { terms, .. } => {
+            DistortionKind::Radial { terms, .. } => {
                 let mut all = axis_px.map(|px| px / self.half_px).to_vec();
                 all.resize(2 + usize::from(!self.equal_aspect) + terms, 0.0);
                 all
@@ -352,7 +361,7 @@ impl Free {
 
     fn warp(&self, parameters: &[f64]) -> Warp {
         match self.kind {
-            Kind::Polynomial { terms } => {
+            DistortionKind::Polynomial { terms } => {
                 let along = [&parameters[..terms], &parameters[terms..]].map(|along| {
                     let with_degree = along.iter().zip(DEGREES);
                     let coefficient = |(p, degree): (&f64, i32)| {
@@ -362,7 +371,7 @@ impl Free {
                 });
                 Warp::Polynomial { along }
             }
-            Kind::Radial { all_powers, .. } => {
+            DistortionKind::Radial { all_powers, .. } => {
                 let aspect = (!self.equal_aspect).then(|| parameters[2]);
                 Warp::Radial {
                     axis_px: [parameters[0] * self.half_px, parameters[1] * self.half_px],

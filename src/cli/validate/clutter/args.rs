@@ -1,10 +1,10 @@
 //! The options of the suite of clutter.
 
 use crate::cli::options::catalog::CatalogOptions;
-use crate::cli::options::format::Format;
+use crate::cli::options::format::OutputFormat;
 use crate::cli::options::setup::SetupOptions;
 use clap::Args;
-use starpipe::study::clutter::Kind;
+use starpipe::study::clutter::ClutterKind;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -35,8 +35,8 @@ pub(crate) struct ClutterArgs {
     #[arg(long, value_name = "DIR")]
     pub(super) pictures: Option<PathBuf>,
     /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(super) format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    pub(super) format: OutputFormat,
     #[command(flatten)]
     pub(super) setup: SetupOptions,
     #[command(flatten)]
@@ -45,16 +45,16 @@ pub(crate) struct ClutterArgs {
 
 /// Kinds of frames, in their order.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Kinds(pub(super) Vec<Kind>);
+pub(super) struct Kinds(pub(super) Vec<ClutterKind>);
 
 fn kinds(text: &str) -> Result<Kinds, String> {
-    let all = Kind::ALL.into_iter();
-    let kinds: Vec<Kind> = match text {
+    let all = ClutterKind::ALL.into_iter();
+    let kinds: Vec<ClutterKind> = match text {
         "all" => all.collect(),
         "sky" => all.filter(|kind| kind.is_sky()).collect(),
         "no-sky" => all.filter(|kind| !kind.is_sky()).collect(),
         names => {
-            let wanted: Result<Vec<Kind>, String> = names.split(',').map(named).collect();
+            let wanted: Result<Vec<ClutterKind>, String> = names.split(',').map(named).collect();
             let wanted = wanted?;
             all.filter(|kind| wanted.contains(kind)).collect()
         }
@@ -62,9 +62,9 @@ fn kinds(text: &str) -> Result<Kinds, String> {
     Ok(Kinds(kinds))
 }
 
-fn named(name: &str) -> Result<Kind, String> {
-    Kind::named(name.trim()).ok_or_else(|| {
-        let known = Kind::ALL.map(Kind::name).join(", ");
+fn named(name: &str) -> Result<ClutterKind, String> {
+    ClutterKind::named(name.trim()).ok_or_else(|| {
+        let known = ClutterKind::ALL.map(ClutterKind::name).join(", ");
         format!("'{name}' is not one of all, sky, no-sky, {known}")
     })
 }
@@ -75,11 +75,11 @@ mod tests {
 
     #[test]
     fn kinds_are_named_one_by_one_or_together() {
-        assert_eq!(kinds("all").unwrap().0, Kind::ALL);
+        assert_eq!(kinds("all").unwrap().0, ClutterKind::ALL);
         assert_eq!(kinds("sky").unwrap().0.len(), 12);
         assert_eq!(kinds("no-sky").unwrap().0.len(), 9);
         let two = kinds("jpeg, foliage").unwrap().0;
-        assert_eq!(two, [Kind::Foliage, Kind::Jpeg]);
+        assert_eq!(two, [ClutterKind::Foliage, ClutterKind::Jpeg]);
         assert!(kinds("").unwrap_err().contains("foliage"));
         assert!(kinds("jpeg,sea").unwrap_err().contains("'sea'"));
     }

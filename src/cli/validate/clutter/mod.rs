@@ -5,13 +5,13 @@ mod pictures;
 
 pub(crate) use args::ClutterArgs;
 
-use crate::cli::exit::{CommandError, Outcome};
+use crate::cli::exit::{CommandError, CommandOutput};
 use crate::cli::progress::frames_bar_with_speed;
 use starpipe::model::simulate::Setup;
-use starpipe::study::clutter::{KindResult, Protocol, run};
+use starpipe::study::clutter::{ClutterProtocol, KindResult, run};
 
 /// `starpipe validate --suite clutter`
-pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<CommandOutput, CommandError> {
     let kinds = &arguments.kinds.0;
     let setups = arguments.setup.setups()?;
     let mut all_written = true;
@@ -19,7 +19,7 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
         let progress = frames_bar_with_speed(arguments.count * (setups.len() * kinds.len()) as u64);
         let done = || progress.inc(1);
         let mut table = |(camera, setup): &(String, Setup)| {
-            let protocol = Protocol {
+            let protocol = ClutterProtocol {
                 setup: setup.clone(),
                 frames: arguments.count,
                 seed: arguments.seed,
@@ -50,12 +50,12 @@ pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<Outcome, CommandError> 
     };
     let rows = tables.iter().flat_map(|table| &table.rows);
     let text = arguments.format.of_rows(text, rows)?;
-    Ok(Outcome::success(text).if_written(all_written))
+    Ok(CommandOutput::success(text).if_written(all_written))
 }
 
 /// The results of one camera.
 struct Table {
-    protocol: Protocol,
+    protocol: ClutterProtocol,
     rows: Vec<KindResult>,
 }
 
@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-fn introduction(protocol: &Protocol) -> String {
+fn introduction(protocol: &ClutterProtocol) -> String {
     let camera = &protocol.setup.scenario.camera;
     format!(
         "{} frames of each kind, seed {}; {}, {} × {} px; nothing known beforehand.\n\

@@ -4,7 +4,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::files::write_into;
 use starpipe::frame::{TiffOptions, TiffSamples, write_tiff};
 use starpipe::identify::IndexedCatalog;
-use starpipe::study::clutter::{FrameMaker, Kind, Protocol};
+use starpipe::study::clutter::{ClutterKind, ClutterProtocol, FrameMaker};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -15,8 +15,8 @@ const MAX_FRAMES: u64 = 20;
 /// all are written.
 pub(super) fn write(
     directory: &Path,
-    kinds: &[Kind],
-    protocol: &Protocol,
+    kinds: &[ClutterKind],
+    protocol: &ClutterProtocol,
     indexed: &IndexedCatalog,
 ) -> Result<bool, CommandError> {
     let mut all_written = true;

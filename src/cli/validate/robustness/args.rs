@@ -2,12 +2,12 @@
 
 use super::sweep::RobustnessSweep;
 use crate::cli::options::catalog::CatalogOptions;
-use crate::cli::options::format::Format;
+use crate::cli::options::format::OutputFormat;
 use crate::cli::options::values::{self, MAX_SIDE_PX};
 use crate::cli::plot::PlotFile;
 use clap::{Args, ValueEnum};
 use starpipe::identify::Photometry;
-use starpipe::study::robustness::{Mirrored, Protocol};
+use starpipe::study::robustness::{Mirrored, TrialProtocol};
 
 /// So many centroids a frame has at most.
 const MAX_BRIGHT_FALSE: i64 = 100_000;
@@ -39,8 +39,8 @@ pub(crate) struct RobustnessArgs {
     #[arg(long, value_name = "NAME=FROM:TO:COUNT")]
     pub(super) sweep: Vec<RobustnessSweep>,
     /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub(super) format: Format,
+    #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
+    pub(super) format: OutputFormat,
     /// Also draw the rates into this file
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
     pub(super) plot: Option<PlotFile>,
@@ -104,8 +104,8 @@ pub(super) enum MirroredArg {
 
 impl ProtocolOptions {
     /// The protocol that the options describe.
-    pub(super) fn protocol(&self) -> Protocol {
-        Protocol {
+    pub(super) fn protocol(&self) -> TrialProtocol {
+        TrialProtocol {
             fov_deg: self.fov,
             width_px: self.width as usize,
             height_px: self.height as usize,

@@ -2,8 +2,8 @@
 
 use super::rows::SweptRow;
 use crate::cli::plot::{
-    Area, Axis, BLACK, BLUE as RIGHT, FONT, Figure, LETTERS_PX, Layer, Marks, ORANGE as WRONG,
-    Panel, Sheet, chart_on, plot_error,
+    Area, Axis, BLACK, BLUE as RIGHT, FONT, Figure, LETTERS_PX, Marks, ORANGE as WRONG, Panel,
+    PlotLayer, Sheet, chart_on, plot_error,
 };
 use plotters::prelude::*;
 use starpipe::study::robustness::{CaseResult, VariedParameter};
@@ -44,7 +44,7 @@ fn panel(parameter: VariedParameter, rows: &[SweptRow]) -> Panel {
     let line = |label: &str, color, count: fn(&CaseResult) -> usize| {
         let percent = |row: &CaseResult| 100.0 * count(row) as f64 / row.counted.max(1) as f64;
         let line = points.iter().map(|(value, row)| (*value, percent(row)));
-        Layer::new(label, color, Marks::Line(line.collect()))
+        PlotLayer::new(label, color, Marks::Line(line.collect()))
     };
     let intervals = points.iter().map(|(value, row)| {
         let interval = [row.right_low_percent, row.right_high_percent];
@@ -57,7 +57,7 @@ fn panel(parameter: VariedParameter, rows: &[SweptRow]) -> Panel {
         y: Axis::of("% of the trials").within(0.0, 104.0),
         layers: vec![
             line("right", RIGHT, |row| row.right),
-            Layer::unnamed(RIGHT, intervals),
+            PlotLayer::unnamed(RIGHT, intervals),
             line("none", NO_ANSWER, |row| row.no_answer),
             line("wrong", WRONG, |row| row.wrong),
         ],

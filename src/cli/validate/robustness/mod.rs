@@ -8,13 +8,13 @@ mod table;
 
 pub(crate) use args::RobustnessArgs;
 
-use crate::cli::exit::{CommandError, Outcome};
+use crate::cli::exit::{CommandError, CommandOutput};
 use crate::cli::output::files::write_each;
 use anyhow::Context;
 use figure::RateTable;
 
 /// `starpipe validate --suite robustness`
-pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Outcome, CommandError> {
+pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<CommandOutput, CommandError> {
     let rows = rows::run_all(arguments)?;
     let plot = arguments.plot.as_ref().map(|plot| {
         let file = match figure::sweeps(&rows) {
@@ -28,5 +28,5 @@ pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<Outcome, CommandE
     let text = arguments
         .format
         .of_rows(|| table::text(arguments, &rows), table)?;
-    Ok(Outcome::success(text).if_written(all_written))
+    Ok(CommandOutput::success(text).if_written(all_written))
 }

@@ -3,7 +3,7 @@
 use super::args::RobustnessArgs;
 use crate::cli::exit::CommandError;
 use crate::cli::progress::bar;
-use starpipe::study::robustness::{Case, CaseResult, VariedParameter, run, standard_cases};
+use starpipe::study::robustness::{CaseResult, ProtocolCase, VariedParameter, run, standard_cases};
 
 /// A row of the table.
 pub(super) struct SweptRow {
@@ -21,7 +21,7 @@ pub(super) fn run_all(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, Comma
             trials * cases.len() as u64,
             "trials {wide_bar} {pos}/{len} {eta}",
         );
-        let row = |(case, swept): (Case, Option<(VariedParameter, f64)>)| {
+        let row = |(case, swept): (ProtocolCase, Option<(VariedParameter, f64)>)| {
             let done = || progress.inc(1);
             let tally = pool.install(|| run(indexed, &case.protocol, trials, seed, &done));
             let row = CaseResult::new(&case, &tally, arguments.least_true_stars);
@@ -34,7 +34,7 @@ pub(super) fn run_all(arguments: &RobustnessArgs) -> Result<Vec<SweptRow>, Comma
 }
 
 /// The case of each row: those of the sweeps, else the standard ones.
-fn cases(arguments: &RobustnessArgs) -> Vec<(Case, Option<(VariedParameter, f64)>)> {
+fn cases(arguments: &RobustnessArgs) -> Vec<(ProtocolCase, Option<(VariedParameter, f64)>)> {
     let base = arguments.protocol.protocol();
     if arguments.sweep.is_empty() {
         let standard = standard_cases(&base).into_iter();
@@ -43,7 +43,7 @@ fn cases(arguments: &RobustnessArgs) -> Vec<(Case, Option<(VariedParameter, f64)
     let mut cases = Vec::new();
     for sweep in &arguments.sweep {
         for &value in &sweep.values {
-            let case = Case {
+            let case = ProtocolCase {
                 label: format!("{} {value}", sweep.parameter.name()),
                 protocol: sweep.parameter.set(&base, value),
             };

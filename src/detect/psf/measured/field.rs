@@ -60,13 +60,13 @@ fn models() -> [Vec<Basis>; 7] {
 type BasisValues = ArrayVec<(usize, f64), MAX_PARAMETERS>;
 
 /// The moments of one star, their variances, and the terms at its place.
-struct Sample {
+struct MomentSample {
     values: Moments,
     variances: Moments,
     terms: [f64; FIELD_TERMS],
 }
 
-impl Sample {
+impl MomentSample {
     fn of(star: &PsfStar, frame: &FieldFrame) -> Self {
         Self {
             values: Moments::from(star.moments),
@@ -104,7 +104,7 @@ pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (Field
     let known = stars
         .iter()
         .filter(|star| star.variances.iter().all(|v| v.is_finite()));
-    let samples: Vec<Sample> = known.map(|star| Sample::of(star, &frame)).collect();
+    let samples: Vec<MomentSample> = known.map(|star| MomentSample::of(star, &frame)).collect();
     let values = 3 * samples.len();
     let is_allowed = |model: &&Vec<Basis>| values >= 2 * model.len() + 6;
     let fits: Vec<(usize, FieldFit)> = models()
@@ -147,7 +147,7 @@ struct FieldFit {
 impl FieldFit {
     /// The weighted least-squares fit of a model; stars far off count less. `None` where the stars
     /// do not fix it.
-    fn of(samples: &[Sample], model: &[Basis]) -> Option<Self> {
+    fn of(samples: &[MomentSample], model: &[Basis]) -> Option<Self> {
         /// Rounds of weights.
         const ROUNDS: usize = 4;
         let mut weights: Vec<Moments> = samples

@@ -4,8 +4,8 @@ use super::stars::{PsfStar, StarFitter};
 use crate::base::size::Size;
 use crate::detect::fit::{BLOCK, Block, products_in_lanes, sum_of};
 use crate::detect::psf::{
-    EffectivePsf, FieldForm, FieldLobe, GROUP_PX, LitPart, Lobe, LocalPsf, NarrowProfiles,
-    PixelGroup, SpotMoments, covariance, each_of, inverse, plus,
+    EffectivePsf, FieldComponent, FieldForm, GROUP_PX, GaussianComponent, LitPart, LocalPsf,
+    NarrowProfiles, PixelGroup, SpotMoments, covariance, each_of, inverse, plus,
 };
 use multiversion::multiversion;
 use nalgebra::DMatrix;
@@ -28,11 +28,11 @@ const MIN_SHARE: f64 = 1.5e-3;
 
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
-pub(super) struct LobeGrid {
+pub(super) struct ComponentGrid {
     /// Moments of the spots that it is for.
     pub typical: SpotMoments,
     /// With shares of one.
-    lobes: Vec<Lobe>,
+    lobes: Vec<GaussianComponent>,
     /// Distance of each from the centre in standard deviations of the spot without the lobes' own
     /// width.
     distances: Vec<f64>,
@@ -43,7 +43,7 @@ pub(super) struct LobeGrid {
     both: Vec<usize>,
 }
 
-impl LobeGrid {
+impl ComponentGrid {
     /// For spots of these moments.
     pub fn of(typical: SpotMoments) -> Self {
         let elongation = libm::hypot(typical[1], typical[2]);
@@ -67,22 +67,22 @@ impl LobeGrid {
         let places = (-steps..=steps).flat_map(|row| {
             (-steps..=steps).map(move |column| [column, row].map(|i| f64::from(i) * pitch_px))
         });
-        let lobes: Vec<Lobe> = places
+        let lobes: Vec<GaussianComponent> = places
             .filter(|&place| square(outline, place) <= REACH_SIGMAS.powi(2))
-            .map(|offset_px| Lobe {
+            .map(|offset_px| GaussianComponent {
                 offset_px,
                 sigma_px,
                 share: 1.0,
             })
             .collect();
-        let distance = |lobe: &Lobe| square(density, lobe.offset_px).sqrt();
+        let distance = |lobe: &GaussianComponent| square(density, lobe.offset_px).sqrt();
         let distances: Vec<f64> = lobes.iter().map(distance).collect();
         let class_of = |image: fn([f64; 2]) -> [f64; 2]| -> Vec<usize> {
             let near =
                 |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 0.1 * pitch_px;
-            let class = |(number, lobe): (usize, &Lobe)| {
+            let class = |(number, lobe): (usize, &GaussianComponent)| {
                 let at = image(lobe.offset_px);
-                let is_same = |other: &Lobe| near(other.offset_px, at);
+                let is_same = |other: &GaussianComponent| near(other.offset_px, at);
                 lobes
                     .iter()
                     .position(is_same)
@@ -126,23 +126,23 @@ impl LobeGrid {
     }
 
     /// The lobes of a Gaussian.
-    pub fn gaussian(&self) -> Vec<FieldLobe> {
+    pub fn gaussian(&self) -> Vec<FieldComponent> {
         let shares = self.expected_shares();
         self.with_shares(&[&shares, &shares])
     }
 
     /// The lobes that have light, with shares at the centre and in the corners.
-    fn with_shares(&self, [centre, corner]: &[&[f64]; 2]) -> Vec<FieldLobe> {
+    fn with_shares(&self, [centre, corner]: &[&[f64]; 2]) -> Vec<FieldComponent> {
         let [in_centre, in_corner] = [centre, corner].map(|shares| shares.iter().sum::<f64>());
-        let lobe = |((lobe, centre), corner): ((&Lobe, &f64), &f64)| FieldLobe {
-            lobe: Lobe {
+        let lobe = |((lobe, centre), corner): ((&GaussianComponent, &f64), &f64)| FieldComponent {
+            lobe: GaussianComponent {
                 share: centre / in_centre,
                 ..*lobe
             },
             corner_share: corner / in_corner,
         };
         let lobes = self.lobes.iter().zip(*centre).zip(*corner).map(lobe);
-        let has_light = |l: &FieldLobe| l.lobe.share.max(l.corner_share) > MIN_SHARE;
+        let has_light = |l: &FieldComponent| l.lobe.share.max(l.corner_share) > MIN_SHARE;
         lobes.filter(has_light).collect()
     }
 
@@ -156,12 +156,12 @@ impl LobeGrid {
         stars: impl IntoIterator<Item = &'s PsfStar>,
         classes: &[usize],
         fitter: &mut StarFitter,
-    ) -> [LobeSums; 2] {
+    ) -> [ComponentEquations; 2] {
         let classes = ImageClasses::of(classes);
         let mut of_halves = [(); 2].map(|()| LaneSums::new(psf.form, &classes));
-        let mut images = LobeImages::default();
+        let mut images = ComponentImages::default();
         let mut local = LocalPsf::default();
-        let every_lobe = self.lobes.iter().map(|&lobe| FieldLobe {
+        let every_lobe = self.lobes.iter().map(|&lobe| FieldComponent {
             lobe,
             corner_share: lobe.share,
         });
@@ -178,7 +178,7 @@ impl LobeGrid {
             let outward = psf.moments.frame.distance(x_px, y_px);
             of_halves[number % 2].add(&images, outward);
         }
-        of_halves.map(|sums| LobeSums::of(sums, classes.clone()))
+        of_halves.map(|sums| ComponentEquations::of(sums, classes.clone()))
     }
 
     /// [`Self::sums`] for solutions of the form of `psf` alone.
@@ -187,7 +187,7 @@ impl LobeGrid {
         psf: &EffectivePsf,
         stars: impl IntoIterator<Item = &'s PsfStar>,
         fitter: &mut StarFitter,
-    ) -> [LobeSums; 2] {
+    ) -> [ComponentEquations; 2] {
         let all = self.classes(psf.form);
         // In the corners fewer shares are the same than in the centre.
         let classes = match psf.form {
@@ -203,25 +203,30 @@ impl LobeGrid {
         psf: &EffectivePsf,
         stars: &[PsfStar],
         fitter: &mut StarFitter,
-    ) -> [LobeSums; 2] {
+    ) -> [ComponentEquations; 2] {
         self.sums(psf, stars, &self.classes(FieldForm::Fixed), fitter)
     }
 
     /// The shares that fit best: of the centre, and where the PSF changes of the corners. The search
     /// begins with `near` ones where there are any.
-    pub fn shares(&self, sums: &LobeSums, form: FieldForm, near: Option<&[f64]>) -> Vec<f64> {
+    pub fn shares(
+        &self,
+        sums: &ComponentEquations,
+        form: FieldForm,
+        near: Option<&[f64]>,
+    ) -> Vec<f64> {
         let expected = self.expected_shares();
         sums.solve(&expected, near, &self.classes(form))
     }
 
     /// The lobes that have light, with these [`Self::shares`].
-    pub fn lobes_of(&self, shares: &[f64]) -> Vec<FieldLobe> {
+    pub fn lobes_of(&self, shares: &[f64]) -> Vec<FieldComponent> {
         let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
         self.with_shares(&[&shares[..self.lobes.len()], corner])
     }
 
     /// The lobes that fit best.
-    pub fn solve(&self, sums: &LobeSums, form: FieldForm) -> Vec<FieldLobe> {
+    pub fn solve(&self, sums: &ComponentEquations, form: FieldForm) -> Vec<FieldComponent> {
         self.lobes_of(&self.shares(sums, form, None))
     }
 }
@@ -268,7 +273,7 @@ fn ranks(classes: &[usize]) -> (Vec<usize>, usize) {
 
 /// The pixels of one star and the light of each image in them, over their noise.
 #[derive(Debug, Default)]
-struct LobeImages {
+struct ComponentImages {
     /// Block by block, each row by row; empty images fill the last block.
     light: Vec<Block>,
     /// Rows of each block that have light, and groups in these: the first, and the one after the last.
@@ -282,7 +287,7 @@ struct LobeImages {
     profiles: NarrowProfiles,
 }
 
-impl LobeImages {
+impl ComponentImages {
     /// Draws lobes with shares of one, for pixels with weights and values.
     fn draw(&mut self, star: &PsfStar, local: &LocalPsf, classes: &ImageClasses) {
         let PsfStar { window, spot, .. } = star;
@@ -328,14 +333,14 @@ impl LobeImages {
 /// Adds lobes to the images that they are a part of, with a spot at this place in a window of this size.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_weighted_lobes(
-    images: &mut LobeImages,
+    images: &mut ComponentImages,
     flux: f32,
-    lobes: &[Lobe],
+    lobes: &[GaussianComponent],
     of_lobes: &[usize],
     [x_px, y_px]: [f64; 2],
     size: Size,
 ) {
-    let LobeImages {
+    let ComponentImages {
         light,
         lit,
         width,
@@ -408,7 +413,7 @@ impl LaneSums {
     }
 
     /// Adds the pixels of a star.
-    fn add(&mut self, images: &LobeImages, outward: f64) {
+    fn add(&mut self, images: &ComponentImages, outward: f64) {
         let (inward, outward) = ((1.0 - outward) as f32, outward as f32);
         match self.right.len() {
             1 => add_products(images, &[1.0], &mut self.products),
@@ -427,7 +432,7 @@ impl LaneSums {
 
 /// Adds these parts of the products of all images to each of the sums.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_products(images: &LobeImages, parts: &[f32], sums: &mut [Vec<BlockProducts>]) {
+fn add_products(images: &ComponentImages, parts: &[f32], sums: &mut [Vec<BlockProducts>]) {
     let mut pair = 0;
     for column in 0..images.lit.len() {
         for row in 0..=column {
@@ -455,7 +460,7 @@ fn add_products(images: &LobeImages, parts: &[f32], sums: &mut [Vec<BlockProduct
 
 /// Adds these parts of the products of all images and the values to each of the sums.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_values(images: &LobeImages, parts: &[f32], sums: &mut [Vec<Block>]) {
+fn add_values(images: &ComponentImages, parts: &[f32], sums: &mut [Vec<Block>]) {
     for block in 0..images.lit.len() {
         let mut products = [[0.0f32; GROUP_PX]; BLOCK];
         for (light, values) in images.block(block).iter().zip(&images.values) {
@@ -477,7 +482,7 @@ fn add_values(images: &LobeImages, parts: &[f32], sums: &mut [Vec<Block>]) {
 
 /// Normal equations of the shares: of the centre, and where the PSF changes of the corners.
 #[derive(Debug, Clone)]
-pub(super) struct LobeSums {
+pub(super) struct ComponentEquations {
     images: ImageClasses,
     /// Sums of the products of images i ≤ j in row i and column j; where the PSF changes, weighted
     /// with the product of the parts that two shares have: both of the centre, one, none.
@@ -486,7 +491,7 @@ pub(super) struct LobeSums {
     right: Vec<Vec<f64>>,
 }
 
-impl LobeSums {
+impl ComponentEquations {
     /// Adds the lanes.
     fn of(sums: LaneSums, images: ImageClasses) -> Self {
         let count = images.padded_count();

@@ -20,7 +20,7 @@ use crate::detect::psf::{
 };
 use crate::detect::star_model::{StarModel, noise_of};
 use field::moments_over_field;
-use lobe_shares::{LobeGrid, LobeSums};
+use lobe_shares::{ComponentEquations, ComponentGrid};
 use stars::{PsfStar, STEPS, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.
@@ -55,8 +55,8 @@ pub(crate) fn measure_psf(
     }
     let windows = stars.iter().map(|star| (star.window.clone(), star.spot));
     let mut round: Vec<(Window, SpotEstimate)> = windows.collect();
-    let grid = LobeGrid::of(typical_moments(&stars));
-    let settled = Settled::of(&grid, maps, &mut stars, &mut fitter);
+    let grid = ComponentGrid::of(typical_moments(&stars));
+    let settled = SymmetricPsf::of(&grid, maps, &mut stars, &mut fitter);
     let best = best_of(&grid, &settled, &stars, &mut fitter);
     if are_unlike(best.total_chi2(), &stars) {
         return None;
@@ -84,17 +84,17 @@ fn are_unlike(chi2: f64, stars: &[PsfStar]) -> bool {
 }
 
 /// A point-symmetric PSF with its moments over the field.
-struct Settled {
+struct SymmetricPsf {
     psf: EffectivePsf,
-    sums: [LobeSums; 2],
+    sums: [ComponentEquations; 2],
     /// Whether size or elongation differ from place to place.
     is_varied: bool,
 }
 
-impl Settled {
+impl SymmetricPsf {
     /// Moves the stars to where they are with it.
     fn of(
-        grid: &LobeGrid,
+        grid: &ComponentGrid,
         maps: &FrameMaps<'_>,
         stars: &mut [PsfStar],
         fitter: &mut StarFitter,
@@ -134,7 +134,7 @@ impl Settled {
 }
 
 /// A PSF, and those of each half of the stars.
-struct Candidate {
+struct PsfCandidate {
     psf: EffectivePsf,
     /// For the stars of even numbers, from the odd ones, and the other way round.
     of_halves: [EffectivePsf; 2],
@@ -142,11 +142,11 @@ struct Candidate {
     chi2: Vec<f64>,
 }
 
-impl Candidate {
+impl PsfCandidate {
     fn of(
-        grid: &LobeGrid,
+        grid: &ComponentGrid,
         psf: &EffectivePsf,
-        [even, odd]: &[LobeSums; 2],
+        [even, odd]: &[ComponentEquations; 2],
         stars: &[PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
@@ -156,7 +156,7 @@ impl Candidate {
         };
         let shares = grid.shares(&even.plus(odd), psf.form, None);
         // The halves are not far from the whole.
-        let of_half = |sums: &LobeSums| with(&grid.shares(sums, psf.form, Some(&shares)));
+        let of_half = |sums: &ComponentEquations| with(&grid.shares(sums, psf.form, Some(&shares)));
         let of_halves = [of_half(odd), of_half(even)];
         let mut chi2 = vec![0.0; stars.len()];
         for (half, psf) in of_halves.iter().enumerate() {
@@ -188,19 +188,19 @@ impl Candidate {
 
 /// The best form of the PSF, the simplest of those that are as good.
 fn best_of(
-    grid: &LobeGrid,
-    settled: &Settled,
+    grid: &ComponentGrid,
+    settled: &SymmetricPsf,
     stars: &[PsfStar],
     fitter: &mut StarFitter,
-) -> Candidate {
-    let Settled { psf, sums, .. } = settled;
+) -> PsfCandidate {
+    let SymmetricPsf { psf, sums, .. } = settled;
     let of_form = |form: FieldForm| EffectivePsf {
         form,
         ..psf.clone()
     };
-    let mut best = Candidate::of(grid, psf, sums, stars, fitter);
+    let mut best = PsfCandidate::of(grid, psf, sums, stars, fitter);
     let fixed = of_form(FieldForm::Fixed);
-    best = best.or_better(Candidate::of(grid, &fixed, sums, stars, fitter));
+    best = best.or_better(PsfCandidate::of(grid, &fixed, sums, stars, fitter));
     match of_radial(grid, of_form(FieldForm::Radial), stars, &best, fitter) {
         Some(radial) => best.or_better(radial),
         None => best,
@@ -211,12 +211,12 @@ fn best_of(
 /// fitted to have no smaller chi² than with the `best` one, which is not fitted to them, or are not
 /// alike with either.
 fn of_radial(
-    grid: &LobeGrid,
+    grid: &ComponentGrid,
     mut psf: EffectivePsf,
     stars: &[PsfStar],
-    best: &Candidate,
+    best: &PsfCandidate,
     fitter: &mut StarFitter,
-) -> Option<Candidate> {
+) -> Option<PsfCandidate> {
     /// One of so many stars is tried first.
     const TRIED: usize = 3;
     if stars.len() < MIN_STARS_OF_FIELD {
@@ -242,7 +242,7 @@ fn of_radial(
     let mut stars = stars.to_vec();
     fitter.place(&mut stars, &psf);
     let sums = grid.sums_of_form(&psf, &stars, fitter);
-    Some(Candidate::of(grid, &psf, &sums, &stars, fitter))
+    Some(PsfCandidate::of(grid, &psf, &sums, &stars, fitter))
 }
 
 /// Half of the side of the windows, in pixels.
@@ -266,7 +266,7 @@ fn typical_light(stars: &[PsfStar], maps: &FrameMaps<'_>) -> f64 {
 }
 
 /// The noise model of the stars, each compared with the PSF from the other half of them.
-fn noise_of_psf(best: &Candidate, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
+fn noise_of_psf(best: &PsfCandidate, stars: &[PsfStar], buffers: &mut FitBuffers) -> NoiseModel {
     let spot_at = |half: usize, x_px: f64, y_px: f64| {
         let mut spot = LocalPsf::default();
         best.of_halves[half].at(x_px, y_px, &mut spot);

@@ -7,8 +7,9 @@ use crate::detect::fit::{
     FrameMaps, NoiseModel, NormalEquations, SpotEstimate, Window, WindowPixels, sum_of,
 };
 use crate::detect::psf::{
-    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, LIGHT_BY_PLACE, LitPart, Lobe,
-    LocalPsf, NarrowProfiles, PixelGroup, ShareGroup, SpotMoments, covariance_by, stretch_by,
+    DrawBuffers, EffectivePsf, FieldFrame, FieldMoments, GROUP_PX, GaussianComponent,
+    LIGHT_BY_PLACE, LitPart, LocalPsf, NarrowProfiles, PixelGroup, ShareGroup, SpotMoments,
+    covariance_by, stretch_by,
 };
 use crate::detect::star_model::isolated_peaks;
 use multiversion::multiversion;
@@ -295,7 +296,7 @@ fn add_pixels<const N: usize>(
 }
 
 /// What larger moments change in a lobe.
-struct LobeChanges {
+struct ComponentChanges {
     /// Inverse of its standard deviation, in px⁻¹.
     per_sigma: f32,
     /// How far each of the moments moves it along x and y, in pixels.
@@ -307,7 +308,7 @@ struct LobeChanges {
 /// Adds lobes that have these moments to the pixels of a window, with a spot at this place.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_lobes(
-    lobes: &[Lobe],
+    lobes: &[GaussianComponent],
     moments: SpotMoments,
     [x_px, y_px]: [f64; 2],
     size: Size,
@@ -326,7 +327,7 @@ fn draw_lobes(
         let [dx, dy] = lobe.offset_px;
         let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
         let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
-        let changes = LobeChanges {
+        let changes = ComponentChanges {
             per_sigma: (1.0 / lobe.sigma_px) as f32,
             moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
             widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
@@ -338,7 +339,7 @@ fn draw_lobes(
 /// The same without the derivatives with respect to the moments.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_still_lobes(
-    lobes: &[Lobe],
+    lobes: &[GaussianComponent],
     [x_px, y_px]: [f64; 2],
     size: Size,
     profiles: &mut NarrowProfiles,
@@ -360,7 +361,7 @@ fn draw_still_lobes(
 #[inline(always)]
 fn add_lobe_with_moments(
     share: f32,
-    changes: &LobeChanges,
+    changes: &ComponentChanges,
     profiles: &NarrowProfiles,
     part: LitPart,
     into: &mut [MomentShares],

@@ -36,7 +36,7 @@ pub(super) struct Ridge {
 }
 
 /// The pixels near a straight line.
-pub(super) struct Band<'a> {
+pub(super) struct TrailBand<'a> {
     search: &'a TrailSearch<'a>,
     cells: &'a CellMap,
     /// A point of the line, and its direction.
@@ -50,14 +50,14 @@ pub(super) struct Band<'a> {
 
 /// What a fit tells beside the line and its width.
 #[derive(Clone, Copy)]
-struct Fit {
+struct RidgeFit {
     height_adu: f64,
     height_sigma_adu: f64,
     across_sigma_px: f64,
 }
 
 /// The light along the line, for each pixel of its length.
-struct Profile {
+struct LineProfile {
     /// Where it begins, from the line's point.
     start_px: f64,
     /// Sums of light and of weights: their ratio is the height.
@@ -67,7 +67,7 @@ struct Profile {
     sides: [Vec<[f64; 2]>; 2],
 }
 
-impl<'a> Band<'a> {
+impl<'a> TrailBand<'a> {
     /// Along a line of cells.
     pub fn new(
         search: &'a TrailSearch<'a>,
@@ -136,7 +136,7 @@ impl<'a> Band<'a> {
     }
 
     /// A step of Gauss and Newton: line, and width where it is free, fit the pixels of the stretch better.
-    fn fit(&mut self, is_width_free: bool) -> Option<Fit> {
+    fn fit(&mut self, is_width_free: bool) -> Option<RidgeFit> {
         let sigma_px = self.sigma_px;
         let half_px = (self.stretch_px[1] - self.stretch_px[0]) / 2.0;
         let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
@@ -187,7 +187,7 @@ impl<'a> Band<'a> {
         let scatter = ((squares - found.dot(&right)) / (count - TERMS as f64))
             .max(1.0)
             .sqrt();
-        Some(Fit {
+        Some(RidgeFit {
             height_adu,
             height_sigma_adu: scatter * height_sigma_adu,
             across_sigma_px: scatter * covariance[(2, 2)].sqrt() * sigma_px / height_adu,
@@ -203,7 +203,7 @@ impl<'a> Band<'a> {
     }
 
     /// The light along the line through the whole frame.
-    fn profile(&self) -> Profile {
+    fn profile(&self) -> LineProfile {
         let reach_px = 4.0 * self.sigma_px;
         let side_px = 6.0 * self.sigma_px.max(1.0);
         let view = self.search.view;
@@ -219,7 +219,7 @@ impl<'a> Band<'a> {
         };
         let (start_px, end_px) = (to_border(-1.0), to_border(1.0));
         let bins = (end_px - start_px) as usize + 1;
-        let mut profile = Profile {
+        let mut profile = LineProfile {
             start_px: start_px - 0.5,
             light: vec![0.0; bins],
             weight: vec![0.0; bins],
@@ -289,7 +289,7 @@ impl<'a> Band<'a> {
     }
 }
 
-impl Profile {
+impl LineProfile {
     /// Subtracts the level beside the line, which is that of a longer part: `heights` are the sums of the
     /// ridge's weights.
     fn level(&mut self, heights: &[f64]) {

@@ -1,7 +1,7 @@
 //! What is left of a frame without its stars, in square cells.
 
 use super::input::TrailSearch;
-use super::radon::{self, Line};
+use super::radon::{self, RadonLine};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median_and_sigma;
 use crate::detect::background::Piece;
@@ -242,12 +242,12 @@ impl CellMap {
     }
 
     /// The lines that stand out, strongest first; in a map of noise there are `false_alarms`.
-    pub fn significant_lines(&self, false_alarms: f64) -> Vec<Line> {
+    pub fn significant_lines(&self, false_alarms: f64) -> Vec<RadonLine> {
         radon::significant_lines([self.columns, self.rows], &self.values, false_alarms)
     }
 
     /// Whether a line still stands out.
-    pub fn is_significant(&self, line: &Line, false_alarms: f64) -> bool {
+    pub fn is_significant(&self, line: &RadonLine, false_alarms: f64) -> bool {
         self.log10_false_alarm(line.in_pixels(self.side_px)) <= libm::log10(false_alarms)
     }
 

@@ -34,7 +34,7 @@ pub(in crate::detect) use input::TrailSearch;
 
 use crate::base::coords::PixelPoint;
 use crate::detect::pixels::View;
-use band::{Band, Ridge};
+use band::{Ridge, TrailBand};
 use cells::CellMap;
 use std::ops::RangeInclusive;
 
@@ -98,7 +98,7 @@ impl TrailSearch<'_> {
                     continue;
                 }
                 followed += 1;
-                let ridge = Band::new(self, &cells, line.in_pixels(cells.side_px)).ridge();
+                let ridge = TrailBand::new(self, &cells, line.in_pixels(cells.side_px)).ridge();
                 let is_new = |ridge: &Ridge| !trails.iter().any(|trail| self.is_part(ridge, trail));
                 let ridge = ridge.filter(is_new);
                 let trail = ridge.and_then(|ridge| self.trail(&cells, &ridge));

@@ -12,14 +12,14 @@ pub(super) const MIN_CELLS: usize = 16;
 
 /// A straight line of cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Line {
+pub(super) struct RadonLine {
     /// Column and row of the first cell and of the last one.
     pub ends: [[usize; 2]; 2],
     /// Sum of the cells over its standard deviation in noise.
     pub snr: f64,
 }
 
-impl Line {
+impl RadonLine {
     /// The middles of its outer cells.
     pub fn in_pixels(&self, side_px: usize) -> [PixelPoint; 2] {
         let middle = |cell: usize| (cell as f64 + 0.5) * side_px as f64 - 0.5;
@@ -56,7 +56,7 @@ pub(super) fn significant_lines(
     [columns, rows]: [usize; 2],
     values: &[f32],
     false_alarms: f64,
-) -> Vec<Line> {
+) -> Vec<RadonLine> {
     let log10_limit = libm::log10(false_alarms / lines_of(columns, rows) as f64);
     let mut lines = Vec::new();
     for is_turned in [false, true] {
@@ -82,7 +82,7 @@ pub(super) fn significant_lines(
                 }
                 let last = rows - 1;
                 let right = (found.right * last + (found.rows - 1) / 2) / (found.rows - 1);
-                lines.push(Line {
+                lines.push(RadonLine {
                     ends: [place(x, y), place((x + right).min(width - 1), y + last)],
                     snr: found.snr,
                 });

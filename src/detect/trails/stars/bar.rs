@@ -1,12 +1,12 @@
 //! A star that is drawn out evenly along a straight line, fitted to the light along it.
 
 use super::light::{FittedTrail, Template};
-use super::profile::Profile;
-use super::shape::Shape;
+use super::profile::TrailProfile;
+use super::shape::TrailShape;
 
 /// A bar fitted to a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Bar {
+pub(super) struct StreakProfile {
     /// Distance of its middle along the profile, in pixels,
     pub along_px: f64,
     /// its standard error,
@@ -28,17 +28,17 @@ const STEP_SHARE: f64 = 1.0 / 400.0;
 /// Error of the place that even bright trails have, in pixels: the motion is not even.
 const MIN_ERROR_PX: f64 = 0.1;
 
-impl Bar {
+impl StreakProfile {
     /// The bar of this shape that explains the profile best, among those that cover its middle to
     /// within `margin_px`; its light is that of the template, or even. Its place is the mean over all
     /// places, each as likely as it explains the light: where an end is not seen, the error tells.
     pub fn fit(
-        profile: &Profile,
-        shape: &Shape,
+        profile: &TrailProfile,
+        shape: &TrailShape,
         template: Option<&Template>,
         margin_px: f64,
     ) -> Option<Self> {
-        let even = Sums::of(profile);
+        let even = ProfileSums::of(profile);
         let range_px = 0.5 * shape.length_px + margin_px;
         let step_px = STEP_PX.max(STEP_SHARE * shape.length_px);
         let tries = (2.0 * range_px / step_px).floor() as usize;
@@ -82,15 +82,15 @@ impl Bar {
 }
 
 /// Sums over the steps of a profile before each of them.
-struct Sums {
+struct ProfileSums {
     /// Of light × weight.
     light: Vec<f64>,
     /// Of the weights.
     weight: Vec<f64>,
 }
 
-impl Sums {
-    fn of(profile: &Profile) -> Self {
+impl ProfileSums {
+    fn of(profile: &TrailProfile) -> Self {
         let terms = || profile.light.iter().zip(&profile.weight);
         let before = |term: &dyn Fn(f64, f64) -> f64| {
             let running = terms().scan(0.0, |sum, (&light, &weight)| {
@@ -128,7 +128,7 @@ impl Sums {
     }
 
     /// Chi² over its degrees of freedom under the bar: above 1 where the light is uneven.
-    fn excess(&self, profile: &Profile, middle: f64, length_px: f64, bar: FittedTrail) -> f64 {
+    fn excess(&self, profile: &TrailProfile, middle: f64, length_px: f64, bar: FittedTrail) -> f64 {
         let level = bar.flux() / length_px;
         // The first and the last step are filled in part.
         let first = (middle - 0.5 * length_px + 1.0).ceil().max(0.0) as usize;
@@ -144,7 +144,7 @@ impl Sums {
 }
 
 /// Centre of the light across the bar, and its standard error from noise, in pixels.
-fn across(profile: &Profile, along_px: f64, shape: &Shape) -> [f64; 2] {
+fn across(profile: &TrailProfile, along_px: f64, shape: &TrailShape) -> [f64; 2] {
     let middle = along_px + profile.middle as f64;
     let first = (middle - 0.5 * shape.length_px).round().max(0.0) as usize;
     let end = (middle + 0.5 * shape.length_px).round().max(0.0) as usize + 1;

@@ -1,6 +1,6 @@
 //! The light along a star's trail, and the flux of a star by it.
 
-use super::profile::Profile;
+use super::profile::TrailProfile;
 
 /// The light along a trail, in steps of one pixel, with sum 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,14 +28,14 @@ impl Template {
     }
 
     /// The steps of a profile that a template around a place covers.
-    fn steps(&self, profile: &Profile, place: f64) -> std::ops::Range<usize> {
+    fn steps(&self, profile: &TrailProfile, place: f64) -> std::ops::Range<usize> {
         let first = (place - self.middle).floor().max(0.0) as usize;
         let end = (place - self.middle + self.light.len() as f64).max(0.0) as usize + 1;
         first..end.min(profile.light.len())
     }
 
     /// The flux of a star whose trail is around a place.
-    pub fn fitted(&self, profile: &Profile, place: f64) -> FittedTrail {
+    pub fn fitted(&self, profile: &TrailProfile, place: f64) -> FittedTrail {
         let mut sums = FittedTrail::default();
         for i in self.steps(profile, place) {
             let weighted = self.at(i, place) * profile.weight[i];
@@ -46,7 +46,7 @@ impl Template {
     }
 
     /// Chi² over its degrees of freedom of a star of this flux there.
-    pub fn excess(&self, profile: &Profile, place: f64, flux: f64) -> f64 {
+    pub fn excess(&self, profile: &TrailProfile, place: f64, flux: f64) -> f64 {
         let steps = self
             .steps(profile, place)
             .filter(|&i| profile.weight[i] > 0.0);

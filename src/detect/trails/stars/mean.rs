@@ -3,11 +3,11 @@
 //! It begins and ends where it falls to half, which is what fixes the middle: clouds, wind and the
 //! motion itself make it uneven, and a bar of uneven light is not centred on its trail.
 
-use super::bar::Bar;
+use super::bar::StreakProfile;
 use super::largest::LargeRegion;
 use super::light::Template;
-use super::profile::{Profile, Strip};
-use super::shape::Shape;
+use super::profile::{Strip, TrailProfile};
+use super::shape::TrailShape;
 use crate::detect::fit::FrameMaps;
 
 /// Part of the trail at each end whose mean light is the level there,
@@ -27,7 +27,7 @@ const MAX_SNR: f64 = 30.0;
 pub(super) fn measure_template(
     maps: &FrameMaps<'_>,
     regions: &[&LargeRegion<'_>],
-    shape: &Shape,
+    shape: &TrailShape,
     template: Option<&Template>,
 ) -> Option<Template> {
     let mut mean = MeanProfile::default();
@@ -41,11 +41,11 @@ pub(super) fn measure_template(
 pub(super) fn for_each_trail(
     maps: &FrameMaps<'_>,
     regions: &[&LargeRegion<'_>],
-    shape: &Shape,
+    shape: &TrailShape,
     template: Option<&Template>,
-    mut use_trail: impl FnMut(&Profile, &Bar),
+    mut use_trail: impl FnMut(&TrailProfile, &StreakProfile),
 ) {
-    let mut profile = Profile::default();
+    let mut profile = TrailProfile::default();
     for large in regions {
         let mut strip = Strip {
             x: large.region.x,
@@ -54,7 +54,7 @@ pub(super) fn for_each_trail(
             reach_px: 1.2 * shape.length_px,
         };
         profile.measure(maps, &strip);
-        if let Some(bar) = Bar::fit(&profile, shape, template, 0.0) {
+        if let Some(bar) = StreakProfile::fit(&profile, shape, template, 0.0) {
             strip.shift(bar.along_px, bar.across_px);
             profile.measure(maps, &strip);
             use_trail(&profile, &bar);
@@ -70,7 +70,7 @@ struct MeanProfile {
 }
 
 impl MeanProfile {
-    fn add(&mut self, profile: &Profile, bar: &Bar) {
+    fn add(&mut self, profile: &TrailProfile, bar: &StreakProfile) {
         let snr = (bar.flux_adu / bar.sigma_flux_adu).min(MAX_SNR);
         let weight = snr * snr;
         self.sums.resize(profile.light.len(), [0.0; 2]);

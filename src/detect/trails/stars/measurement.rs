@@ -1,8 +1,8 @@
 //! From the pieces of trails to detections: one for each star.
 
-use super::bar::Bar;
-use super::profile::{Profile, Strip};
-use super::shape::Shape;
+use super::bar::StreakProfile;
+use super::profile::{Strip, TrailProfile};
+use super::shape::TrailShape;
 use super::trails::Trails;
 use crate::base::coords::PixelPoint;
 use crate::base::interrupt::Interrupted;
@@ -13,11 +13,11 @@ use crate::detect::measure::clamp_to_frame;
 
 /// A bar in the frame.
 #[derive(Debug, Clone, Copy)]
-struct PlacedBar {
+struct StreakInFrame {
     /// Its middle.
     x: f64,
     y: f64,
-    bar: Bar,
+    bar: StreakProfile,
     /// Whether other trails are next to it.
     is_blended: bool,
     /// Whether one of its pieces is saturated.
@@ -35,8 +35,8 @@ pub(in crate::detect) fn measure_trailed(
     detections: &mut Vec<Detection>,
 ) -> Result<(), Interrupted> {
     let shape = trails.shape;
-    let mut bars: Vec<PlacedBar> = Vec::new();
-    let mut profile = Profile::default();
+    let mut bars: Vec<StreakInFrame> = Vec::new();
+    let mut profile = TrailProfile::default();
     for peak in peaks {
         maps.view.check()?;
         if let Some(bar) = bars.iter_mut().find(|bar| bar.covers(&shape, peak)) {
@@ -44,7 +44,7 @@ pub(in crate::detect) fn measure_trailed(
         } else if !peak.saturated && maps.contrast_at(peak).is_sharper_than_any_spot() {
             detections.push(hot_pixel(maps, peak));
         } else {
-            let placed = PlacedBar::at(maps, trails, peak, &bars, &mut profile);
+            let placed = StreakInFrame::at(maps, trails, peak, &bars, &mut profile);
             bars.extend(placed);
         }
     }
@@ -52,14 +52,14 @@ pub(in crate::detect) fn measure_trailed(
     Ok(())
 }
 
-impl PlacedBar {
+impl StreakInFrame {
     /// The bar whose brightest piece is at a peak, beside those found before.
     fn at(
         maps: &FrameMaps<'_>,
         trails: &Trails,
         peak: &Peak,
         others: &[Self],
-        profile: &mut Profile,
+        profile: &mut TrailProfile,
     ) -> Option<Self> {
         /// The line goes through the peak, then through the light across it.
         const ROUNDS: usize = 2;
@@ -84,7 +84,7 @@ impl PlacedBar {
                     profile.forget(along - half_px, along + half_px);
                 }
             }
-            let bar = Bar::fit(profile, shape, template.as_ref(), shape.half_breadth_px)?;
+            let bar = StreakProfile::fit(profile, shape, template.as_ref(), shape.half_breadth_px)?;
             strip.shift(0.0, bar.across_px);
             found = Some(Self {
                 x: strip.x + bar.along_px * cos,
@@ -98,7 +98,7 @@ impl PlacedBar {
     }
 
     /// Whether a peak is a piece of this star.
-    fn covers(&self, shape: &Shape, peak: &Peak) -> bool {
+    fn covers(&self, shape: &TrailShape, peak: &Peak) -> bool {
         let strip = Strip {
             x: self.x,
             y: self.y,
@@ -110,7 +110,7 @@ impl PlacedBar {
             && along.abs() < 0.5 * shape.length_px + self.bar.sigma_along_px + shape.half_breadth_px
     }
 
-    fn detection(&self, maps: &FrameMaps<'_>, shape: &Shape) -> Detection {
+    fn detection(&self, maps: &FrameMaps<'_>, shape: &TrailShape) -> Detection {
         let Self { x, y, bar, .. } = *self;
         let [cos, sin] = shape.direction.map(f64::abs);
         let view = &maps.view;

@@ -1,11 +1,11 @@
 //! The light of a trail along it.
 
-use super::shape::Shape;
+use super::shape::TrailShape;
 use crate::detect::fit::FrameMaps;
 
 /// Light in steps of one pixel along a direction through a point, summed across.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Profile {
+pub(super) struct TrailProfile {
     /// Light of each step, in ADU.
     pub light: Vec<f64>,
     /// Inverse variance of each step, in ADU⁻²; 0 where nothing is known.
@@ -21,7 +21,7 @@ pub(super) struct Profile {
 pub(super) struct Strip {
     pub x: f64,
     pub y: f64,
-    pub shape: Shape,
+    pub shape: TrailShape,
     pub reach_px: f64,
 }
 
@@ -67,7 +67,7 @@ fn interval(slope: f64, offset: f64, limit: f64) -> [f64; 2] {
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
-impl Profile {
+impl TrailProfile {
     /// Sums the pixels of a strip.
     pub fn measure(&mut self, maps: &FrameMaps<'_>, strip: &Strip) {
         let view = &maps.view;

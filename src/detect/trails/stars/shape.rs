@@ -2,7 +2,7 @@
 
 /// Direction, length and breadth that the trails of a frame share.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Shape {
+pub(super) struct TrailShape {
     /// Cosine and sine of the direction, in coordinates of the view.
     pub direction: [f64; 2],
     /// Length, in pixels.

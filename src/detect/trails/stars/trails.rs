@@ -1,11 +1,11 @@
 //! Direction, length and breadth of the trails that a frame's stars are.
 
-use super::bar::Bar;
+use super::bar::StreakProfile;
 use super::largest::{LargeRegion, MAX, largest_regions};
 use super::light::Template;
 use super::mean::{for_each_trail, measure_template};
-use super::profile::{Profile, Strip};
-use super::shape::Shape;
+use super::profile::{Strip, TrailProfile};
+use super::shape::TrailShape;
 use crate::base::statistics::{median, median_of};
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::StarTrails;
@@ -31,7 +31,7 @@ const ALIGNED: f64 = 0.96;
 /// The shape of the trails of a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::detect) struct Trails {
-    pub(super) shape: Shape,
+    pub(super) shape: TrailShape,
     /// The light along them; `None` where it has no ends: even light is taken.
     pub(super) template: Option<Template>,
 }
@@ -60,13 +60,13 @@ impl Trails {
             return None;
         }
         let lengths = aligned.iter().map(|large| length_px(large.region));
-        let shape = Shape {
+        let shape = TrailShape {
             direction,
             length_px: median_of(lengths)?,
             half_breadth_px: 2.0 * maps.width_px(),
         };
         let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
-        let is_possible = |shape: &Shape| (SHORTEST_PX..longest_px).contains(&shape.length_px);
+        let is_possible = |shape: &TrailShape| (SHORTEST_PX..longest_px).contains(&shape.length_px);
         let mut shape = Some(shape)
             .filter(is_possible)
             .map(|shape| refined(maps, &aligned, shape))
@@ -101,10 +101,10 @@ impl Trails {
 }
 
 /// The shape among similar ones with which the stars of the regions stand out most.
-fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> Shape {
-    let mut profile = Profile::default();
+fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: TrailShape) -> TrailShape {
+    let mut profile = TrailProfile::default();
     // Of logarithms: the brightest star counts no more than others.
-    let mut likelihood = |shape: Shape| -> f64 {
+    let mut likelihood = |shape: TrailShape| -> f64 {
         let gains = regions.iter().filter_map(|large| {
             let strip = Strip {
                 x: large.region.x,
@@ -113,11 +113,11 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
                 reach_px: 1.5 * shape.length_px,
             };
             profile.measure(maps, &strip);
-            Bar::fit(&profile, &shape, None, 0.0).map(|bar| libm::log(bar.gain))
+            StreakProfile::fit(&profile, &shape, None, 0.0).map(|bar| libm::log(bar.gain))
         });
         gains.sum()
     };
-    let mut best_of = |shape: Shape, others: &mut dyn Iterator<Item = Shape>| {
+    let mut best_of = |shape: TrailShape, others: &mut dyn Iterator<Item = TrailShape>| {
         let mut best = (likelihood(shape), shape);
         for other in others {
             let with_other = likelihood(other);
@@ -127,7 +127,7 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
         }
         best.1
     };
-    let stretched = |shape: Shape, factor: f64| Shape {
+    let stretched = |shape: TrailShape, factor: f64| TrailShape {
         length_px: shape.length_px * factor,
         ..shape
     };
@@ -138,7 +138,7 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
         let mut lengths = (-10..=20).map(|i| stretched(shape, libm::exp(step * f64::from(i))));
         shape = best_of(shape, &mut lengths);
         shape = turned(shape, median_slope(maps, regions, &shape));
-        let mut breadths = (2..=12).map(|step| Shape {
+        let mut breadths = (2..=12).map(|step| TrailShape {
             half_breadth_px: 0.5 * f64::from(step),
             ..shape
         });
@@ -148,10 +148,10 @@ fn refined(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: Shape) -> 
 }
 
 /// A shape turned by an angle in radians.
-fn turned(shape: Shape, angle: f64) -> Shape {
+fn turned(shape: TrailShape, angle: f64) -> TrailShape {
     let [cos, sin] = shape.direction;
     let (s, c) = libm::sincos(angle);
-    Shape {
+    TrailShape {
         direction: [cos * c - sin * s, sin * c + cos * s],
         ..shape
     }
@@ -159,7 +159,7 @@ fn turned(shape: Shape, angle: f64) -> Shape {
 
 /// By what angle the trails in the regions are turned from the shape, in radians: the median of the
 /// slopes of their light.
-fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &Shape) -> f64 {
+fn median_slope(maps: &FrameMaps<'_>, regions: &[&LargeRegion<'_>], shape: &TrailShape) -> f64 {
     let mut slopes: ArrayVec<f64, MAX> = ArrayVec::new();
     for_each_trail(maps, regions, shape, None, |profile, _| {
         slopes.push(profile.slope(0.5 * shape.length_px));

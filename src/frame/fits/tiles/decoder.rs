@@ -7,7 +7,7 @@ use super::method::{Method, Values};
 use super::quantize::{Dither, Quantized};
 use super::table::{TileColumn, TileTable};
 use crate::frame::FrameError;
-use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
+use crate::frame::account::{PIXELS_BETWEEN_CHECKS, ReadBudget};
 use crate::frame::fits::error::{malformed, unsupported};
 use crate::frame::fits::unit::{FitsUnit, StoredType};
 
@@ -26,15 +26,15 @@ pub(super) struct Decoder<'a> {
 
 /// Where the parameters of quantized tiles are.
 struct Quantization {
-    scale: Source<f64>,
-    zero: Source<f64>,
-    blank: Option<Source<i64>>,
+    scale: TileParameter<f64>,
+    zero: TileParameter<f64>,
+    blank: Option<TileParameter<i64>>,
     dither: Dither,
 }
 
 /// Where a parameter is: in a column, or the same for all tiles.
 #[derive(Clone, Copy)]
-enum Source<T> {
+enum TileParameter<T> {
     Column(TileColumn),
     All(T),
 }
@@ -105,7 +105,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The pixels of `tile` as an image that is not compressed has them: big-endian, of ZBITPIX.
-    pub fn pixels(&self, tile: &Tile, account: &Account) -> Result<Vec<u8>, TileError> {
+    pub fn pixels(&self, tile: &Tile, account: &ReadBudget) -> Result<Vec<u8>, TileError> {
         let count = tile.pixels();
         let width = self.stored.bytes();
         let data = |column: Option<TileColumn>| match column {
@@ -139,7 +139,7 @@ impl<'a> Decoder<'a> {
         &self,
         data: &[u8],
         tile: &Tile,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Vec<u8>, TileError> {
         /// Writers may store narrow numbers in words of four bytes.
         const WORD_BYTES: usize = 4;
@@ -186,7 +186,7 @@ impl<'a> Decoder<'a> {
 fn bytes_of<const N: usize>(
     count: usize,
     mut values: impl Iterator<Item = [u8; N]>,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Vec<u8>, TileError> {
     // Faster than to collect a flat map.
     let mut bytes = vec![0; count * N];
@@ -211,10 +211,10 @@ impl Quantization {
     /// How the floats of the image were quantized; `None` if they were not.
     fn of(unit: &FitsUnit, table: &TileTable) -> Result<Option<Self>, FrameError> {
         let header = &unit.header;
-        let source = |name| -> Result<Option<Source<f64>>, FrameError> {
+        let source = |name| -> Result<Option<TileParameter<f64>>, FrameError> {
             match table.column(name) {
-                Some(column) => Ok(Some(Source::Column(column))),
-                None => Ok(header.finite(name)?.map(Source::All)),
+                Some(column) => Ok(Some(TileParameter::Column(column))),
+                None => Ok(header.finite(name)?.map(TileParameter::All)),
             }
         };
         let method = header.text("ZQUANTIZ");
@@ -236,28 +236,28 @@ impl Quantization {
             return Ok(None);
         };
         let blank = match table.column("ZBLANK") {
-            Some(column) => Some(Source::Column(column)),
-            None => unit.blank().map(Source::All),
+            Some(column) => Some(TileParameter::Column(column)),
+            None => unit.blank().map(TileParameter::All),
         };
         Ok(Some(Self {
             scale,
-            zero: source("ZZERO")?.unwrap_or(Source::All(0.0)),
+            zero: source("ZZERO")?.unwrap_or(TileParameter::All(0.0)),
             blank,
             dither,
         }))
     }
 
     fn of_tile(&self, table: &TileTable, row: usize) -> Quantized {
-        let number = |source: Source<f64>| match source {
-            Source::Column(column) => table.number(column, row).unwrap_or(f64::NAN),
-            Source::All(number) => number,
+        let number = |source: TileParameter<f64>| match source {
+            TileParameter::Column(column) => table.number(column, row).unwrap_or(f64::NAN),
+            TileParameter::All(number) => number,
         };
         Quantized {
             scale: number(self.scale),
             zero: number(self.zero),
             blank: self.blank.and_then(|source| match source {
-                Source::Column(column) => table.whole_number(column, row),
-                Source::All(blank) => Some(blank),
+                TileParameter::Column(column) => table.whole_number(column, row),
+                TileParameter::All(blank) => Some(blank),
             }),
             dither: self.dither,
         }

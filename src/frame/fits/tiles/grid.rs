@@ -4,7 +4,7 @@
 
 use crate::base::size::Size;
 use crate::frame::FrameError;
-use crate::frame::fits::header::Header;
+use crate::frame::fits::header::UnitHeader;
 use std::ops::Range;
 
 /// The tiles of an image.
@@ -29,7 +29,7 @@ pub(super) struct Tile {
 
 impl TileGrid {
     /// The grid of an image with these axes, none of them empty. Without ZTILEn tiles are rows.
-    pub fn new(axes: &[usize], header: &Header) -> Result<Self, FrameError> {
+    pub fn new(axes: &[usize], header: &UnitHeader) -> Result<Self, FrameError> {
         let length = |(axis, &pixels): (usize, &usize)| {
             let keyword = format!("ZTILE{}", axis + 1);
             let expected = "a length of 1 or more";

@@ -4,7 +4,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.2.
 
 use super::error::TileError;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use flate2::bufread::MultiGzDecoder;
 use std::io::Read;
 
@@ -14,7 +14,7 @@ pub(super) fn inflate(
     data: &[u8],
     count: usize,
     max_width: usize,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Vec<u8>, TileError> {
     let limit = count * max_width;
     let mut bytes = Vec::with_capacity(limit + 1);
@@ -65,10 +65,10 @@ mod tests {
     #[test]
     fn no_more_than_the_pixels_is_decompressed() {
         let bomb = deflate(&vec![0; 10_000_000]);
-        let refused = inflate(&bomb, 100, 4, &Account::default());
+        let refused = inflate(&bomb, 100, 4, &ReadBudget::default());
         assert_eq!(refused, Err(TileError::Long { pixels: 100 }));
         assert_eq!(
-            inflate(&deflate(&[7; 400]), 100, 4, &Account::default()).unwrap(),
+            inflate(&deflate(&[7; 400]), 100, 4, &ReadBudget::default()).unwrap(),
             [7; 400]
         );
     }
@@ -76,9 +76,9 @@ mod tests {
     #[test]
     fn damage_is_an_error() {
         let mut data = deflate(b"some pixels, and more of them");
-        assert!(inflate(&data[..20], 100, 4, &Account::default()).is_err());
+        assert!(inflate(&data[..20], 100, 4, &ReadBudget::default()).is_err());
         data[14] ^= 0x55;
-        assert!(inflate(&data, 100, 4, &Account::default()).is_err());
+        assert!(inflate(&data, 100, 4, &ReadBudget::default()).is_err());
     }
 
     #[test]

@@ -6,9 +6,9 @@ use super::hcompress::Hcompress;
 use super::rice::{Rice, RiceWidth};
 use super::{gzip, plio};
 use crate::frame::FrameError;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::fits::error::{malformed, unsupported};
-use crate::frame::fits::header::Header;
+use crate::frame::fits::header::UnitHeader;
 use crate::frame::fits::unit::StoredType;
 
 /// A compression (ZCMPTYPE) and its parameters (ZNAMEn, ZVALn).
@@ -35,7 +35,7 @@ pub(super) enum Values {
 
 impl Method {
     /// The compression of the image with this header, whose pixels are `stored`.
-    pub fn of(header: &Header, stored: StoredType) -> Result<Self, FrameError> {
+    pub fn of(header: &UnitHeader, stored: StoredType) -> Result<Self, FrameError> {
         const EXPECTED: &str =
             "GZIP_1, GZIP_2 or NOCOMPRESS, or RICE_1, HCOMPRESS_1 or PLIO_1 of at most 32 bits";
         let Some(name) = header.text("ZCMPTYPE") else {
@@ -92,7 +92,7 @@ impl Method {
         data: &[u8],
         tile: &Tile,
         max_width: usize,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Values, TileError> {
         let count = tile.pixels();
         Ok(match self {
@@ -155,7 +155,7 @@ impl Values {
 }
 
 /// The parameters of RICE_1.
-fn rice(header: &Header) -> Result<Rice, FrameError> {
+fn rice(header: &UnitHeader) -> Result<Rice, FrameError> {
     /// The standard has 16 and 32.
     const MAX_BLOCK: f64 = 65536.0;
     // The defaults are the standard's.
@@ -175,7 +175,7 @@ fn rice(header: &Header) -> Result<Rice, FrameError> {
 }
 
 /// The parameter `name` of the compression.
-fn parameter(header: &Header, name: &str) -> Result<Option<f64>, FrameError> {
+fn parameter(header: &UnitHeader, name: &str) -> Result<Option<f64>, FrameError> {
     /// As many as the standard's compressions have, and some.
     const MAX_PARAMETERS: usize = 20;
     for number in 1..=MAX_PARAMETERS {

@@ -28,7 +28,7 @@ mod table;
 
 use super::error::{malformed, truncated};
 use super::unit::FitsUnit;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 use crate::frame::{FrameError, MAX_PIXELS};
 use decoder::Decoder;
 use error::TileError;
@@ -52,7 +52,7 @@ pub(super) fn unpack(
     unit: &FitsUnit,
     bytes: &[u8],
     pixels: Range<usize>,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Vec<u8>, FrameError> {
     let grid = TileGrid::new(&unit.axes, &unit.header)?;
     let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
@@ -105,7 +105,7 @@ fn touching(
     grid: &TileGrid,
     tiles: usize,
     pixels: &Range<usize>,
-    account: &Account,
+    account: &ReadBudget,
 ) -> Result<Vec<usize>, FrameError> {
     let mut rows = Vec::new();
     for row in 0..tiles {

@@ -18,13 +18,17 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.3; D. Tody, IRAF's pixel list format.
 
 use super::error::TileError;
-use crate::frame::account::Account;
+use crate::frame::account::ReadBudget;
 
 /// Instructions between two looks at the time. Each gives 4095 pixels or fewer.
 const WORDS_BETWEEN_CHECKS: usize = 256;
 
 /// Decodes `count` pixels.
-pub(super) fn decode(data: &[u8], count: usize, account: &Account) -> Result<Vec<i32>, TileError> {
+pub(super) fn decode(
+    data: &[u8],
+    count: usize,
+    account: &ReadBudget,
+) -> Result<Vec<i32>, TileError> {
     let words: Vec<u16> = data
         .as_chunks()
         .0
@@ -105,9 +109,9 @@ mod tests {
             0x0002, 0x4002, 0x1005, 0x0001, 0x4001, 0x2003, 0x5003, 0x3001, 0x6002, 0x7009,
         ]);
         let expected = [0, 0, 1, 1, 4101, 0, 0, 4104, 4105, 4096, 0, 0];
-        assert_eq!(decode(&data, 12, &Account::default()).unwrap(), expected);
+        assert_eq!(decode(&data, 12, &ReadBudget::default()).unwrap(), expected);
         assert_eq!(
-            decode(&data, 9, &Account::default()),
+            decode(&data, 9, &ReadBudget::default()),
             Err(TileError::Long { pixels: 9 })
         );
     }
@@ -117,18 +121,18 @@ mod tests {
         let words: [u16; 5] = [0, 0, 5, 0x4003, 0x0001];
         let data: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
         assert_eq!(
-            decode(&data, 5, &Account::default()).unwrap(),
+            decode(&data, 5, &ReadBudget::default()).unwrap(),
             [1, 1, 1, 0, 0]
         );
     }
 
     #[test]
     fn damage_is_an_error() {
-        assert!(decode(&list(&[0x8001]), 4, &Account::default()).is_err());
-        assert!(decode(&list(&[0x1001]), 4, &Account::default()).is_err());
+        assert!(decode(&list(&[0x8001]), 4, &ReadBudget::default()).is_err());
+        assert!(decode(&list(&[0x1001]), 4, &ReadBudget::default()).is_err());
         let data = list(&[0x4001, 0x4001]);
-        assert!(decode(&data[..data.len() - 2], 4, &Account::default()).is_err());
-        assert!(decode(&[], 4, &Account::default()).is_err());
+        assert!(decode(&data[..data.len() - 2], 4, &ReadBudget::default()).is_err());
+        assert!(decode(&[], 4, &ReadBudget::default()).is_err());
     }
 
     proptest! {
@@ -139,7 +143,7 @@ mod tests {
             count in 0_usize..5000,
         ) {
             for data in [list(&instructions), raw] {
-                if let Ok(pixels) = decode(&data, count, &Account::default()) {
+                if let Ok(pixels) = decode(&data, count, &ReadBudget::default()) {
                     prop_assert_eq!(pixels.len(), count);
                 }
             }

@@ -9,7 +9,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.1. R. Rice, P.-S. Yeh and W. Miller 1993, AIAA-93-4541.
 
 use super::error::TileError;
-use crate::frame::account::{Account, PIXELS_BETWEEN_CHECKS};
+use crate::frame::account::{PIXELS_BETWEEN_CHECKS, ReadBudget};
 
 /// Parameters of a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,9 +64,9 @@ impl Rice {
         self,
         data: &[u8],
         count: usize,
-        account: &Account,
+        account: &ReadBudget,
     ) -> Result<Vec<i32>, TileError> {
-        let mut bits = Bits::new(data);
+        let mut bits = RiceBits::new(data);
         let short = TileError::Short { pixels: count };
         let (pixel_bits, ..) = self.width.bits();
         let mut value = bits.take(pixel_bits).ok_or(short)?;
@@ -86,7 +86,7 @@ impl Rice {
         self,
         pixels: &mut Vec<i32>,
         count: usize,
-        bits: &mut Bits,
+        bits: &mut RiceBits,
         last: &mut u32,
     ) -> Option<()> {
         let (pixel_bits, code_bits, full) = self.width.bits();
@@ -118,7 +118,7 @@ impl Rice {
 }
 
 /// The bits of a stream, the highest of each byte first.
-struct Bits<'a> {
+struct RiceBits<'a> {
     rest: &'a [u8],
     /// The next bits, from the highest; zeros after them.
     buffer: u64,
@@ -126,7 +126,7 @@ struct Bits<'a> {
     held: u32,
 }
 
-impl<'a> Bits<'a> {
+impl<'a> RiceBits<'a> {
     fn new(data: &'a [u8]) -> Self {
         Self {
             rest: data,
@@ -242,7 +242,7 @@ mod tests {
             0010 1 0 1 1 01 0 0001 0 \
             1111 0000000000000001 0000000000000010 1111111111111111 0000000000000000";
         let pixels = SHORT
-            .decode(&bytes(stream), 12, &Account::default())
+            .decode(&bytes(stream), 12, &ReadBudget::default())
             .unwrap();
         assert_eq!(pixels, [5, 5, 5, 5, 5, 4, 5, 8, 7, 8, -32760, -32760]);
     }
@@ -251,14 +251,14 @@ mod tests {
     fn a_stream_that_ends_early_is_short() {
         let stream = bytes("0000000000000101 0010 1 0 1 1");
         assert_eq!(
-            SHORT.decode(&stream, 4, &Account::default()),
+            SHORT.decode(&stream, 4, &ReadBudget::default()),
             Err(TileError::Short { pixels: 4 })
         );
-        assert!(SHORT.decode(&[], 4, &Account::default()).is_err());
+        assert!(SHORT.decode(&[], 4, &ReadBudget::default()).is_err());
         // Zeros without a one after them.
         assert!(
             SHORT
-                .decode(&[0, 0, 0x30, 0, 0, 0, 0, 0, 0], 4, &Account::default())
+                .decode(&[0, 0, 0x30, 0, 0, 0, 0, 0, 0], 4, &ReadBudget::default())
                 .is_err()
         );
     }
@@ -271,7 +271,7 @@ mod tests {
             (block, count) in (1_usize..70, 0_usize..500),
         ) {
             if let Some(width) = RiceWidth::of(bytes)
-                && let Ok(pixels) = (Rice { block, width }).decode(&data, count, &Account::default()) {
+                && let Ok(pixels) = (Rice { block, width }).decode(&data, count, &ReadBudget::default()) {
                 prop_assert_eq!(pixels.len(), count);
             }
         }

@@ -6,7 +6,7 @@
 use super::error::TileError;
 use crate::frame::FrameError;
 use crate::frame::fits::error::{malformed, truncated};
-use crate::frame::fits::header::Header;
+use crate::frame::fits::header::UnitHeader;
 use crate::frame::fits::unit::FitsUnit;
 
 /// Largest number of columns (TFIELDS).
@@ -169,7 +169,7 @@ fn width_of(kind: u8) -> Option<usize> {
 }
 
 /// The columns that hold something, with their names.
-fn columns(header: &Header, row_bytes: usize) -> Result<Vec<(String, TileColumn)>, FrameError> {
+fn columns(header: &UnitHeader, row_bytes: usize) -> Result<Vec<(String, TileColumn)>, FrameError> {
     let expected = "a number of columns from 0 to 999";
     let count = header.required("TFIELDS", expected)?;
     if !(0..=MAX_COLUMNS).contains(&count) {

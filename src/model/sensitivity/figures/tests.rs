@@ -51,7 +51,7 @@ fn straightness(exposure_s: f64, name: &str, [from, to]: [f64; 2]) -> f64 {
 fn there_are_eleven_each_with_two_curves_and_a_name_of_its_own() {
     let base = Scenario::of(Preset::Experiment1);
     let mut names = BTreeSet::new();
-    for figure in Figure::ALL {
+    for figure in PaperFigure::ALL {
         let curves = figure.curves(&base, &figure.sweep().unwrap()).unwrap();
         assert_eq!(curves.len(), 2, "{}", figure.id);
         assert!(curves.iter().all(|curve| curve.points.len() == VALUES));

@@ -1,6 +1,6 @@
 //! Clusters, nebulae and galaxies.
 
-use super::view::View;
+use super::view::PictureView;
 use crate::catalog::objects::deep_sky;
 use crate::report::overlay::canvas::{Canvas, Rgb};
 use crate::report::overlay::labels::Room;
@@ -12,7 +12,7 @@ const LETTERS: f32 = 11.5;
 const MIN_RADIUS: f32 = 7.0;
 
 /// Draws the objects that have room for their names, brightest first, as dashed circles of their size.
-pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'_>) {
+pub(super) fn draw(canvas: &mut Canvas, view: &PictureView<'_>, room: &mut Room<'_>) {
     let px_per_rad = view.found.camera.focal_length_px() as f32 * view.picture.scale();
     for object in deep_sky() {
         let Some(center) = view.of_catalog(&object.direction) else {

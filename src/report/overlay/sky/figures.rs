@@ -1,6 +1,6 @@
 //! The figures of the constellations.
 
-use super::view::View;
+use super::view::PictureView;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::catalog::objects::constellations;
 use crate::report::overlay::canvas::{Canvas, Rgb};
@@ -13,13 +13,13 @@ const LETTERS: f32 = 14.0;
 const GAP: f64 = 0.06;
 
 /// Draws the figures, and writes the names of the constellations.
-pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'_>) {
+pub(super) fn draw(canvas: &mut Canvas, view: &PictureView<'_>, room: &mut Room<'_>) {
     for constellation in constellations() {
         for pair in constellation.lines.iter().flat_map(|line| line.windows(2)) {
             let places: Vec<_> = points(&pair[0], &pair[1], view.step_rad())
                 .map(|point| view.of_catalog(&point))
                 .collect();
-            View::draw_line(canvas, &places, 1.0, COLOR);
+            PictureView::draw_line(canvas, &places, 1.0, COLOR);
         }
         let middle = view.of_catalog(&constellation.middle);
         let name = constellation.name;

@@ -1,6 +1,6 @@
 //! Grids of right ascension and declination, and of azimuth and altitude.
 
-use super::view::View;
+use super::view::PictureView;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::report::overlay::canvas::{Canvas, Rgb};
@@ -20,7 +20,7 @@ const STEPS_OF_HOURS_DEG: [f64; 9] = [30.0, 15.0, 7.5, 5.0, 2.5, 1.25, 0.5, 0.25
 const POLE_DEG: f64 = 1.0;
 
 /// Draws right ascension and declination (ICRS).
-pub(super) fn equatorial(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'_>) {
+pub(super) fn equatorial(canvas: &mut Canvas, view: &PictureView<'_>, room: &mut Room<'_>) {
     let (centre, _) = view.found.icrs_to_camera.boresight_and_up();
     let (ra_rad, dec_rad) = centre.to_ra_dec();
     let place = |ra_deg: f64, dec_deg: f64| {
@@ -28,7 +28,7 @@ pub(super) fn equatorial(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'
             UnitVector::<Icrs>::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
         view.of_catalog(&direction)
     };
-    let grid = Grid {
+    let grid = CoordinateGrid {
         centre_deg: [ra_rad * DEG_PER_RAD, dec_rad * DEG_PER_RAD],
         steps_deg: [&STEPS_OF_HOURS_DEG, &STEPS_DEG],
         color: EQUATORIAL,
@@ -39,7 +39,7 @@ pub(super) fn equatorial(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'
 }
 
 /// Draws azimuth and altitude, where they are known.
-pub(super) fn horizontal(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'_>) {
+pub(super) fn horizontal(canvas: &mut Canvas, view: &PictureView<'_>, room: &mut Room<'_>) {
     let places = &view.found.places;
     let (centre, _) = view.found.icrs_to_camera.boresight_and_up();
     let (Some(zenith), Some(north), Some(east)) = (
@@ -55,7 +55,7 @@ pub(super) fn horizontal(canvas: &mut Canvas, view: &View<'_>, room: &mut Room<'
         let [azimuth_rad, altitude_rad] = [azimuth_deg, altitude_deg].map(|deg| deg * RAD_PER_DEG);
         view.apparent(&places.in_horizon(azimuth_rad, altitude_rad)?)
     };
-    let grid = Grid {
+    let grid = CoordinateGrid {
         centre_deg: [azimuth_rad * DEG_PER_RAD, altitude_rad * DEG_PER_RAD],
         steps_deg: [&STEPS_DEG, &STEPS_DEG],
         color: HORIZONTAL,
@@ -85,7 +85,7 @@ fn degrees(deg: f64) -> String {
 }
 
 /// A grid of longitudes and latitudes.
-struct Grid<'a> {
+struct CoordinateGrid<'a> {
     /// Longitude and latitude of the frame's centre.
     centre_deg: [f64; 2],
     /// Distances of lines that the grid may have, largest first.
@@ -96,11 +96,11 @@ struct Grid<'a> {
     latitude: fn(f64) -> String,
 }
 
-impl Grid<'_> {
+impl CoordinateGrid<'_> {
     fn draw(
         &self,
         canvas: &mut Canvas,
-        view: &View<'_>,
+        view: &PictureView<'_>,
         place: &impl Fn(f64, f64) -> Option<[f32; 2]>,
         room: &mut Room<'_>,
     ) {
@@ -154,8 +154,8 @@ impl Grid<'_> {
         text: &str,
         room: &mut Room<'_>,
     ) {
-        View::draw_line(canvas, places, 0.7, self.color);
-        let parts = View::visible(places);
+        PictureView::draw_line(canvas, places, 0.7, self.color);
+        let parts = PictureView::visible(places);
         let ends = parts
             .iter()
             .flat_map(|part| [part[0], part[part.len() - 1]]);

@@ -1,6 +1,6 @@
 //! Zenith, horizon and cardinal points, where site and time are known.
 
-use super::view::View;
+use super::view::PictureView;
 use crate::base::units::RAD_PER_DEG;
 use crate::report::overlay::canvas::{Canvas, Rgb};
 
@@ -18,7 +18,7 @@ const STEP_DEG: u32 = 1;
 const LOWEST_DEG: std::ops::RangeInclusive<u32> = 1..=20;
 
 /// Draws what of them is in the frame.
-pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>) {
+pub(super) fn draw(canvas: &mut Canvas, view: &PictureView<'_>) {
     let place = |azimuth_deg: f64, altitude_deg: f64| {
         let [azimuth_rad, altitude_rad] = [azimuth_deg, altitude_deg].map(|deg| deg * RAD_PER_DEG);
         view.apparent(&view.found.places.in_horizon(azimuth_rad, altitude_rad)?)
@@ -27,7 +27,7 @@ pub(super) fn draw(canvas: &mut Canvas, view: &View<'_>) {
         .step_by(STEP_DEG as usize)
         .map(|azimuth_deg| place(f64::from(azimuth_deg), 0.0))
         .collect();
-    View::draw_line(canvas, &horizon, 1.2, COLOR);
+    PictureView::draw_line(canvas, &horizon, 1.2, COLOR);
     for (letter, azimuth_deg) in CARDINALS {
         let mut seen = LOWEST_DEG.filter_map(|altitude| place(azimuth_deg, f64::from(altitude)));
         if let Some([x, y]) = seen.next() {

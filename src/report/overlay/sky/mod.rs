@@ -11,11 +11,11 @@ use super::labels::Room;
 use super::options::SkyLayers;
 use super::picture::Picture;
 use crate::identify::Identification;
-use view::View;
+use view::PictureView;
 
 /// What is drawn together, or not at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Layer {
+pub(super) enum OverlayLayer {
     Horizon,
     EquatorialGrid,
     HorizontalGrid,
@@ -23,7 +23,7 @@ pub(super) enum Layer {
     Constellations,
 }
 
-impl Layer {
+impl OverlayLayer {
     /// All layers, in the order in which they are drawn.
     pub(super) const ALL: [Self; 5] = [
         Self::Horizon,
@@ -52,7 +52,7 @@ impl Layer {
         found: &Identification,
         room: &mut Room<'_>,
     ) {
-        let view = View { picture, found };
+        let view = PictureView { picture, found };
         match self {
             Self::Horizon => horizon::draw(canvas, &view),
             Self::EquatorialGrid => grid::equatorial(canvas, &view, room),
@@ -71,7 +71,10 @@ pub(super) fn draw(
     layers: SkyLayers,
     room: &mut Room<'_>,
 ) {
-    for layer in Layer::ALL.into_iter().filter(|layer| layer.is_in(layers)) {
+    for layer in OverlayLayer::ALL
+        .into_iter()
+        .filter(|layer| layer.is_in(layers))
+    {
         layer.draw(canvas, picture, found, room);
     }
 }

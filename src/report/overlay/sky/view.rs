@@ -6,12 +6,12 @@ use crate::report::overlay::canvas::{Canvas, Rgb};
 use crate::report::overlay::picture::Picture;
 
 /// An identified frame's picture.
-pub(super) struct View<'a> {
+pub(super) struct PictureView<'a> {
     pub(super) picture: &'a Picture,
     pub(super) found: &'a Identification,
 }
 
-impl View<'_> {
+impl PictureView<'_> {
     /// Where an apparent direction is, if it is within the frame.
     pub(super) fn apparent(&self, direction: &UnitVector<Icrs>) -> Option<[f32; 2]> {
         let pixel = self.found.pixel_of(direction)?;

@@ -7,7 +7,7 @@ use crate::camera::data_sheet::Response;
 use crate::catalog::Catalog;
 use crate::model::sensitivity::Reading;
 use crate::model::simulate::SetupParameter;
-use crate::study::validation::Protocol;
+use crate::study::validation::ValidationProtocol;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::io::{self, ErrorKind, Write};
@@ -20,7 +20,7 @@ const SCHEMA: u32 = 3;
 const TABLES: [&str; 4] = ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"];
 
 #[derive(Serialize)]
-struct Identity<'a> {
+struct RunIdentity<'a> {
     schema: u32,
     version: &'static str,
     seed: u64,
@@ -35,11 +35,11 @@ struct Identity<'a> {
     /// Wavelengths in nm and values, if it is a curve.
     lens_transmission_curve: Option<&'a [(f64, f64)]>,
     quantum_efficiency_curve: Option<&'a [(f64, f64)]>,
-    catalog: CatalogIdentity<'a>,
+    catalog: RunCatalog<'a>,
 }
 
 #[derive(Serialize)]
-struct CatalogIdentity<'a> {
+struct RunCatalog<'a> {
     title: &'a str,
     stars: usize,
     checksum: String,
@@ -52,7 +52,7 @@ struct CatalogIdentity<'a> {
 /// [`StoreError::Json`].
 pub fn claim_directory(
     directory: &Path,
-    protocol: &Protocol,
+    protocol: &ValidationProtocol,
     catalog: &Catalog,
 ) -> Result<(), StoreError> {
     std::fs::create_dir_all(directory)
@@ -88,14 +88,14 @@ fn write(path: &Path, identity: &Value) -> io::Result<()> {
     Ok(())
 }
 
-fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json::Error> {
+fn identity(protocol: &ValidationProtocol, catalog: &Catalog) -> Result<Value, serde_json::Error> {
     let scenario = &protocol.setup.scenario;
     let imperfections = &scenario.camera.imperfections;
     let parameters = SetupParameter::all().filter_map(|parameter| {
         let value = parameter.get(&protocol.setup)?;
         Some((parameter.name().to_owned(), Value::from(value)))
     });
-    let identity = Identity {
+    let identity = RunIdentity {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
         seed: protocol.seed,
@@ -111,7 +111,7 @@ fn identity(protocol: &Protocol, catalog: &Catalog) -> Result<Value, serde_json:
         parameters: parameters.collect(),
         lens_transmission_curve: curve(&scenario.camera.lens_transmission),
         quantum_efficiency_curve: curve(&scenario.camera.quantum_efficiency),
-        catalog: CatalogIdentity {
+        catalog: RunCatalog {
             title: catalog.title(),
             stars: catalog.stars().len(),
             checksum: format!("{:016x}", catalog.checksum()),
@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn a_directory_is_of_one_run() {
         let directory = tempfile::tempdir().unwrap();
-        let mut protocol = Protocol {
+        let mut protocol = ValidationProtocol {
             site: None,
             setup: Setup {
                 scenario: Scenario::of(Preset::NanosatTracker),
@@ -158,8 +158,9 @@ mod tests {
             scale_known: true,
             seed: u64::MAX,
         };
-        let claim =
-            |protocol: &Protocol| claim_directory(directory.path(), protocol, Catalog::built_in());
+        let claim = |protocol: &ValidationProtocol| {
+            claim_directory(directory.path(), protocol, Catalog::built_in())
+        };
         claim(&protocol).unwrap();
         claim(&protocol).unwrap();
         protocol.seed = 1;

@@ -17,5 +17,5 @@ mod tables;
 
 pub use error::StoreError;
 pub use identity::claim_directory;
-pub use rows::Rows;
+pub use rows::RowReader;
 pub use tables::{FRAMES_PER_PART, FrameLines, RunTables};

@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// The rows of a table or of a part of it, read one by one.
-pub struct Rows<R> {
+pub struct RowReader<R> {
     path: PathBuf,
     reader: csv::Reader<Take<BufReader<File>>>,
     names: csv::StringRecord,
@@ -20,7 +20,7 @@ pub struct Rows<R> {
     rows: PhantomData<R>,
 }
 
-impl<R: TableRow> Rows<R> {
+impl<R: TableRow> RowReader<R> {
     /// The rows of the table at `path` between two byte offsets, the first on `first_line`.
     pub(super) fn open(
         path: &Path,
@@ -89,7 +89,7 @@ impl<R: TableRow> Rows<R> {
     }
 }
 
-impl<R: TableRow> Iterator for Rows<R> {
+impl<R: TableRow> Iterator for RowReader<R> {
     type Item = Result<R, StoreError>;
 
     fn next(&mut self) -> Option<Self::Item> {

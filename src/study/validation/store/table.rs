@@ -1,7 +1,7 @@
 //! One table as a CSV file that grows.
 
 use super::error::StoreError;
-use super::rows::Rows;
+use super::rows::RowReader;
 use crate::study::validation::record::TableRow;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A table, open for writing at its end.
-pub(super) struct Table<R> {
+pub(super) struct CsvTable<R> {
     path: PathBuf,
     file: File,
     /// Bytes up to the end of the last whole row.
@@ -17,7 +17,7 @@ pub(super) struct Table<R> {
     rows: PhantomData<R>,
 }
 
-impl<R: TableRow> Table<R> {
+impl<R: TableRow> CsvTable<R> {
     /// Opens the table in `directory`, or makes an empty one.
     pub(super) fn open(directory: &Path) -> Result<Self, StoreError> {
         let path = directory.join(format!("{}.csv", R::TABLE));
@@ -37,7 +37,7 @@ impl<R: TableRow> Table<R> {
     }
 
     /// All whole rows.
-    pub(super) fn rows(&self) -> Result<Rows<R>, StoreError> {
+    pub(super) fn rows(&self) -> Result<RowReader<R>, StoreError> {
         let heading = heading::<R>();
         let mut first = vec![0; heading.len()];
         let mut file = File::open(&self.path).map_err(StoreError::file("reading", &self.path))?;
@@ -50,12 +50,12 @@ impl<R: TableRow> Table<R> {
                 problem: format!("not the heading of a table of {}, {expected:?}", R::TABLE),
             });
         }
-        Rows::open(&self.path, [first.len() as u64, self.length], 2)
+        RowReader::open(&self.path, [first.len() as u64, self.length], 2)
     }
 
     /// The rows between two byte offsets.
-    pub(super) fn rows_between(&self, bounds: [u64; 2]) -> Result<Rows<R>, StoreError> {
-        Rows::open(&self.path, bounds, 1)
+    pub(super) fn rows_between(&self, bounds: [u64; 2]) -> Result<RowReader<R>, StoreError> {
+        RowReader::open(&self.path, bounds, 1)
     }
 
     /// Removes all after `length` bytes.

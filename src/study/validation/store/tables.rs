@@ -1,10 +1,10 @@
 //! Both tables of a run, frame by frame.
 
 use super::error::StoreError;
-use super::rows::Rows;
-use super::table::Table;
+use super::rows::RowReader;
+use super::table::CsvTable;
 use crate::study::validation::record::{FrameRecord, StarRecord};
-use crate::study::validation::summary::{Accumulator, RunFacts, Summary};
+use crate::study::validation::summary::{Accumulator, RunFacts, ValidationSummary};
 use serde::Serialize;
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -16,8 +16,8 @@ pub const FRAMES_PER_PART: u64 = 1000;
 /// meanwhile.
 pub struct RunTables {
     _lock: File,
-    frames: Table<FrameRecord>,
-    stars: Table<StarRecord>,
+    frames: CsvTable<FrameRecord>,
+    stars: CsvTable<StarRecord>,
     /// Number of frames that both tables have.
     done: u64,
     /// Byte offsets of the first row of each part, in both tables.
@@ -62,8 +62,8 @@ impl RunTables {
     pub fn open(directory: &Path, seed_of: impl Fn(u64) -> u64) -> Result<Self, StoreError> {
         let mut tables = Self {
             _lock: lock(directory)?,
-            frames: Table::open(directory)?,
-            stars: Table::open(directory)?,
+            frames: CsvTable::open(directory)?,
+            stars: CsvTable::open(directory)?,
             done: 0,
             part_starts: Vec::new(),
         };
@@ -134,7 +134,10 @@ impl RunTables {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn part(&self, part: u64) -> Result<(Rows<FrameRecord>, Rows<StarRecord>), StoreError> {
+    pub fn part(
+        &self,
+        part: u64,
+    ) -> Result<(RowReader<FrameRecord>, RowReader<StarRecord>), StoreError> {
         let part = part as usize;
         let start = self.part_starts[part];
         let lengths = [self.frames.length(), self.stars.length()];
@@ -149,7 +152,7 @@ impl RunTables {
     ///
     /// # Errors
     /// [`StoreError::File`].
-    pub fn frames(&self) -> Result<Rows<FrameRecord>, StoreError> {
+    pub fn frames(&self) -> Result<RowReader<FrameRecord>, StoreError> {
         self.frames.rows()
     }
 
@@ -158,7 +161,11 @@ impl RunTables {
     ///
     /// # Errors
     /// [`StoreError::Changed`], [`StoreError::File`].
-    pub fn summary(&self, facts: RunFacts, limit_vmag: f64) -> Result<Summary, StoreError> {
+    pub fn summary(
+        &self,
+        facts: RunFacts,
+        limit_vmag: f64,
+    ) -> Result<ValidationSummary, StoreError> {
         let mut accumulator = Accumulator::new(facts, limit_vmag);
         for frame in self.frames.rows()? {
             accumulator.add_frame(&frame?);
@@ -171,7 +178,7 @@ impl RunTables {
 }
 
 /// Reads the stars of a frame; whether all of them are there.
-fn skip_stars(stars: &mut Rows<StarRecord>, frame: &FrameRecord) -> Result<bool, StoreError> {
+fn skip_stars(stars: &mut RowReader<StarRecord>, frame: &FrameRecord) -> Result<bool, StoreError> {
     for _ in 0..frame.star_rows {
         let Some(star) = stars.next() else {
             return Ok(false);

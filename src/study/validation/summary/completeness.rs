@@ -47,14 +47,14 @@ struct CompletenessSums {
     predicted: f64,
 }
 
-pub(super) struct Completeness {
+pub(super) struct CompletenessTable {
     limit_vmag: f64,
     /// Lower edge of the second bin.
     from_vmag: f64,
     bins: Vec<CompletenessSums>,
 }
 
-impl Completeness {
+impl CompletenessTable {
     pub(super) fn around(limit_vmag: f64) -> Self {
         /// Magnitudes brighter than the predicted limit at which the bins begin; all brighter stars
         /// share one bin.
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn the_limit_of_a_known_curve_is_found_again() {
-        let mut completeness = Completeness::around(7.05);
+        let mut completeness = CompletenessTable::around(7.05);
         let (limit, width) = (6.9, 0.25);
         for step in 0..3000 {
             let vmag = 5.5 + 0.001 * f64::from(step);
@@ -213,7 +213,7 @@ mod tests {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         let (mut pulls, count) = (Vec::new(), 300);
         for _ in 0..count {
-            let mut completeness = Completeness::around(7.0);
+            let mut completeness = CompletenessTable::around(7.0);
             for _ in 0..400 {
                 let vmag = random.random_range(6.0..8.2);
                 let p = normal_cdf((7.1 - vmag) / 0.3);
@@ -230,12 +230,12 @@ mod tests {
 
     #[test]
     fn where_all_stars_are_found_there_is_no_limit() {
-        let mut completeness = Completeness::around(7.0);
+        let mut completeness = CompletenessTable::around(7.0);
         for step in 0..100 {
             completeness.add(5.0 + 0.01 * f64::from(step), 1.0, true);
         }
         let summary = completeness.finish();
         assert_eq!(summary.measured_limit_vmag, None);
-        assert!(Completeness::around(7.0).finish().bins.is_empty());
+        assert!(CompletenessTable::around(7.0).finish().bins.is_empty());
     }
 }

@@ -19,7 +19,7 @@ use crate::base::format::{to_decimals, to_significant};
 use crate::base::statistics::quantile;
 use crate::study::robustness::{Answer, Interval};
 use centroids::Centroids;
-use completeness::Completeness;
+use completeness::CompletenessTable;
 use identification::Identifications;
 use pulls::RunningStatistics;
 use serde::Serialize;
@@ -51,7 +51,7 @@ pub struct RunFacts {
 
 /// Statistics over many frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Summary {
+pub struct ValidationSummary {
     /// Version of the JSON schema.
     pub schema: u32,
     /// What was simulated.
@@ -154,7 +154,7 @@ pub struct Accumulator {
     frames: usize,
     detection: DetectionSummary,
     identification: Identifications,
-    completeness: Completeness,
+    completeness: CompletenessTable,
     centroids: Centroids,
     /// Pulls of x, y and flux; of the rotations about x, y and the boresight; of the focal length;
     /// of the zero point.
@@ -182,7 +182,7 @@ impl Accumulator {
             frames: 0,
             detection: DetectionSummary::default(),
             identification: Identifications::default(),
-            completeness: Completeness::around(limit_vmag),
+            completeness: CompletenessTable::around(limit_vmag),
             centroids: Centroids::default(),
             pulls: std::array::from_fn(|_| RunningStatistics::new(0.25, 5.0)),
             boresight_arcsec: Vec::new(),
@@ -311,7 +311,7 @@ impl Accumulator {
     }
 
     /// The summary.
-    pub fn finish(mut self) -> Summary {
+    pub fn finish(mut self) -> ValidationSummary {
         let attitude = self.attitude();
         let detection = self.detection();
         let pulls = self.pulls.map(|p| p.pull());
@@ -329,7 +329,7 @@ impl Accumulator {
         ] = pulls;
         let faintest_sigma = self.faintest.count().max(1) as f64;
         let expected_sigma = (self.faintest_variance_sum / faintest_sigma).sqrt();
-        Summary {
+        ValidationSummary {
             schema: SCHEMA,
             frames: self.frames,
             identification: self.identification.finish(),
