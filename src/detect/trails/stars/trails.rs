@@ -6,7 +6,7 @@ use super::light::Template;
 use super::mean::{for_each_trail, measure_template};
 use super::profile::{Strip, TrailProfile};
 use super::shape::TrailShape;
-use crate::base::statistics::{median, median_of};
+use crate::base::statistics::median;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::StarTrails;
 use crate::detect::fit::FrameMaps;
@@ -59,10 +59,11 @@ impl Trails {
         if aligned.len() < fewest || lines < MIN.max(aligned.len() / 2) {
             return None;
         }
-        let lengths = aligned.iter().map(|large| length_px(large.region));
+        let lengths_px = aligned.iter().map(|large| length_px(large.region));
+        let mut lengths_px: ArrayVec<f64, MAX> = lengths_px.collect();
         let shape = TrailShape {
             direction,
-            length_px: median_of(lengths)?,
+            length_px: median(&mut lengths_px),
             half_breadth_px: 2.0 * maps.width_px(),
         };
         let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
@@ -217,8 +218,9 @@ fn lines(regions: &[&LargeRegion<'_>], [cos, sin]: [f64; 2]) -> usize {
         .map(|large| large.region.y * cos - large.region.x * sin);
     let mut across: ArrayVec<f64, MAX> = across.collect();
     across.sort_unstable_by(f64::total_cmp);
-    let breadth_px = median_of(regions.iter().map(|large| large.region.minor_px));
-    let apart_px = 3.0 * breadth_px.unwrap_or(0.0);
+    let breadths_px = regions.iter().map(|large| large.region.minor_px);
+    let mut breadths_px: ArrayVec<f64, MAX> = breadths_px.collect();
+    let apart_px = 3.0 * median(&mut breadths_px);
     let gaps = across
         .windows(2)
         .filter(|pair| pair[1] - pair[0] > apart_px);
