@@ -75,12 +75,11 @@ impl<R, W: Write + Send> TableWriter<R, W> {
     fn write_group(&mut self) -> Result<()> {
         let mut group = self.writer.next_row_group()?;
         for (column, width) in self.columns.iter().zip(&mut self.widths) {
-            let texts = self.rows.iter().filter_map(|row| text((column.value)(row)));
-            let longest = texts.map(|text| text.chars().count()).max();
-            *width = longest.unwrap_or(0).max(*width);
             let missing = || ParquetError::General(format!("{} has no writer", column.name));
             let mut writer = group.next_column()?.ok_or_else(missing)?;
-            write_column(writer.untyped(), column, &self.rows)?;
+            let fields = self.rows.iter().map(column.value).collect();
+            let longest = write_column(writer.untyped(), column.name, column.is_optional, fields)?;
+            *width = longest.max(*width);
             writer.close()?;
         }
         group.close()?;
@@ -117,36 +116,46 @@ fn schema<R>(table: &str, columns: &[Column<R>]) -> String {
     text + "}\n"
 }
 
-fn write_column<R>(writer: &mut ColumnWriter<'_>, column: &Column<R>, rows: &[R]) -> Result<()> {
-    let fields = || rows.iter().map(column.value);
-    let level = |field: FieldValue| i16::from(!is_empty(&field));
+/// Writes the fields of a column, and returns the characters of its longest text. It knows nothing of rows, so that
+/// Parquet's writers are compiled once and not for each table.
+fn write_column(
+    writer: &mut ColumnWriter<'_>,
+    name: &str,
+    is_optional: bool,
+    fields: Vec<FieldValue>,
+) -> Result<usize> {
+    let level = |field: &FieldValue| i16::from(!is_empty(field));
     // Definition levels: 1 for a value, 0 for an empty field.
-    let levels: Option<Vec<i16>> = column.is_optional.then(|| fields().map(level).collect());
+    let levels: Option<Vec<i16>> = is_optional.then(|| fields.iter().map(level).collect());
     let levels = levels.as_deref();
+    let fields = fields.into_iter();
     match writer {
         ColumnWriter::Int64ColumnWriter(typed) => {
-            let values: Vec<i64> = fields().filter_map(integer).collect();
+            let values: Vec<i64> = fields.filter_map(integer).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::DoubleColumnWriter(typed) => {
-            let values: Vec<f64> = fields().filter_map(number).collect();
+            let values: Vec<f64> = fields.filter_map(number).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::BoolColumnWriter(typed) => {
-            let values: Vec<bool> = fields().filter_map(boolean).collect();
+            let values: Vec<bool> = fields.filter_map(boolean).collect();
             typed.write_batch(&values, levels, None)?;
         }
         ColumnWriter::ByteArrayColumnWriter(typed) => {
-            let texts = fields().filter_map(text);
-            let values: Vec<ByteArray> = texts.map(|text| text.into_bytes().into()).collect();
+            let texts: Vec<String> = fields.filter_map(FieldValue::into_text).collect();
+            let longest = texts.iter().map(|text| text.chars().count()).max();
+            let bytes = texts.into_iter().map(String::into_bytes);
+            let values: Vec<ByteArray> = bytes.map(ByteArray::from).collect();
             typed.write_batch(&values, levels, None)?;
+            return Ok(longest.unwrap_or(0));
         }
         _ => {
-            let message = format!("column {} has a type that is not supported", column.name);
+            let message = format!("column {name} has a type that is not supported");
             return Err(ParquetError::General(message));
         }
     }
-    Ok(())
+    Ok(0)
 }
 
 fn is_empty(field: &FieldValue) -> bool {
@@ -176,13 +185,6 @@ fn number(field: FieldValue) -> Option<f64> {
 fn boolean(field: FieldValue) -> Option<bool> {
     match field {
         FieldValue::Bool(value) => value,
-        _ => None,
-    }
-}
-
-fn text(field: FieldValue) -> Option<String> {
-    match field {
-        FieldValue::Text(value) => value,
         _ => None,
     }
 }

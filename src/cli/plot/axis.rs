@@ -1,6 +1,8 @@
 //! The axes of a panel.
 
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::IntoLogRange;
 use std::ops::Range;
 
@@ -58,10 +60,63 @@ impl Axis {
         };
         [self.from.unwrap_or(from), self.to.unwrap_or(to)]
     }
+
+    /// The scale between the two ends.
+    pub(super) fn scale(&self, [from, to]: [f64; 2]) -> Scale {
+        if self.is_log {
+            Scale::Log(logarithmic(from..to))
+        } else {
+            Scale::linear(from..to)
+        }
+    }
+}
+
+/// The scale of an axis. It is one type for all axes, so that charts are compiled once.
+pub(crate) enum Scale {
+    Linear(RangedCoordf64),
+    Log(WithKeyPoints<LogCoord<f64>>),
+}
+
+impl Scale {
+    pub(crate) fn linear(range: Range<f64>) -> Self {
+        Self::Linear(range.into())
+    }
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        match self {
+            Self::Linear(scale) => scale.map(value, limit),
+            Self::Log(scale) => scale.map(value, limit),
+        }
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        match self {
+            Self::Linear(scale) => scale.key_points(hint),
+            Self::Log(scale) => scale.key_points(hint),
+        }
+    }
+
+    fn range(&self) -> Range<f64> {
+        match self {
+            Self::Linear(scale) => scale.range(),
+            Self::Log(scale) => scale.range(),
+        }
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format(value: &f64) -> String {
+        RangedCoordf64::format(value)
+    }
 }
 
 /// A logarithmic axis with round numbers at any range; plotters has only powers of ten.
-pub(super) fn logarithmic(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
+fn logarithmic(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
     let numbers = round_numbers(range.start, range.end);
     let decades = decades(range.start, range.end);
     let lines = decades.flat_map(|decade| (2..10).map(move |i| decade * f64::from(i)));

@@ -11,7 +11,7 @@ mod scaled;
 mod sheet;
 mod style;
 
-pub(crate) use axis::Axis;
+pub(crate) use axis::{Axis, Scale};
 pub(crate) use figure::{Figure, Form};
 pub(crate) use files::{FigureForm, PlotFile, figure_files};
 pub(crate) use layer::{ColorScale, Dot, FilledRectangle, Marks, PlotLayer};

@@ -1,11 +1,10 @@
 //! A panel: layers over two axes, with a title and a legend above.
 
-use super::axis::{Axis, logarithmic};
+use super::axis::{Axis, Scale};
 use super::layer::{ColorScale, Dot, FilledRectangle, Marks, PlotLayer};
 use super::style::{
     Area, FONT, LETTERS_PX, MARGIN_PX, chart_on, draw_text, plot_error, two_digits,
 };
-use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::element::{CoordMapper, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -50,14 +49,7 @@ impl Panel {
         let points: Vec<_> = self.layers.iter().flat_map(PlotLayer::points).collect();
         let x = self.x.range(points.iter().map(|point| point.0));
         let y = self.y.range(points.iter().map(|point| point.1));
-        let ends = Ends { x, y };
-        let (x, y) = (x[0]..x[1], y[0]..y[1]);
-        match (self.x.is_log, self.y.is_log) {
-            (false, false) => self.draw_chart(&body, x, y, ends),
-            (true, false) => self.draw_chart(&body, logarithmic(x), y, ends),
-            (false, true) => self.draw_chart(&body, x, logarithmic(y), ends),
-            (true, true) => self.draw_chart(&body, logarithmic(x), logarithmic(y), ends),
-        }
+        self.draw_chart(&body, Ends { x, y })
     }
 
     /// Draws the title, and the legend below it.
@@ -82,20 +74,9 @@ impl Panel {
         Ok(())
     }
 
-    fn draw_chart<B: DrawingBackend, X, Y>(
-        &self,
-        area: &Area<B>,
-        x: X,
-        y: Y,
-        ends: Ends,
-    ) -> anyhow::Result<()>
-    where
-        X: AsRangedCoord<Value = f64>,
-        X::CoordDescType: ValueFormatter<f64>,
-        Y: AsRangedCoord<Value = f64>,
-        Y::CoordDescType: ValueFormatter<f64>,
-    {
+    fn draw_chart<B: DrawingBackend>(&self, area: &Area<B>, ends: Ends) -> anyhow::Result<()> {
         let mut builder = chart_on(area, BELOW_PX, LEFT_PX);
+        let (x, y) = (self.x.scale(ends.x), self.y.scale(ends.y));
         let mut context = builder.build_cartesian_2d(x, y).map_err(plot_error)?;
         context
             .configure_mesh()
@@ -182,18 +163,13 @@ struct Ends {
 }
 
 /// Axes on which layers are drawn.
-struct Chart<'a, B: DrawingBackend, X: Ranged, Y: Ranged> {
-    context: ChartContext<'a, B, Cartesian2d<X, Y>>,
+struct Chart<'a, B: DrawingBackend> {
+    context: ChartContext<'a, B, Cartesian2d<Scale, Scale>>,
     area: &'a Area<B>,
     ends: Ends,
 }
 
-impl<B, X, Y> Chart<'_, B, X, Y>
-where
-    B: DrawingBackend,
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
+impl<B: DrawingBackend> Chart<'_, B> {
     fn draw(&mut self, layer: &PlotLayer) -> anyhow::Result<()> {
         let color = layer.color;
         match &layer.marks {

@@ -76,7 +76,7 @@ pub(super) type Lanes = [f64; LANES];
 pub(super) struct Adjustment<'a, const P: usize> {
     pub stars: &'a [MeasuredStar],
     /// The camera that the next step starts from, and its attitude.
-    predictor: PositionPredictor,
+    pub predictor: PositionPredictor,
     /// The terms that are fitted.
     model: Option<DistortionModel>,
     prior: Prior<'a>,
@@ -305,6 +305,42 @@ impl PositionPredictor {
             ideal: ideal.map(|along| along / radius_px),
         })
     }
+
+    /// Observed minus predicted position of a star; `None` if it is not imaged.
+    pub fn residual_px(&self, star: &MeasuredStar) -> Option<[f64; 2]> {
+        let predicted = self.predict(&star.icrs)?.observed.at;
+        let [u, v] = self.camera.offset_of(&star.pixel);
+        Some([u - predicted[0], v - predicted[1]])
+    }
+
+    /// Changes the parameters by a share of `change`: of the turn, ln f and the terms of `model`.
+    fn take(&mut self, change: &[f64], share: f64, model: Option<DistortionModel>) {
+        let (pose, changes_px) = change.split_at(POSE_PARAMETERS);
+        let turn = Vector3::new(pose[0], pose[1], pose[2]) * share;
+        let changes_px = changes_px.iter().map(|change| share * change);
+        self.change(turn, share * pose[3], changes_px, model);
+    }
+
+    /// How far the lens is from one that was measured: the pull of its information on ln f and the terms, and the
+    /// misfit.
+    fn pull_of(&self, lens: &CameraModel, information: &DMatrix<f64>) -> (DVector<f64>, f64) {
+        let expected_px = lens
+            .distortion()
+            .map_or(&[][..], Distortion::coefficients_px);
+        let ln_ratio = libm::log(lens.focal_length_px() / self.camera.focal_length_px());
+        // The unknowns: a change of ln f, and terms.
+        let wanted: DVector<f64> = DVector::from_iterator(
+            information.nrows(),
+            std::iter::once(ln_ratio).chain(expected_px.iter().copied()),
+        );
+        let mut off = wanted.clone();
+        let present_px = self.distortion.coefficients_px();
+        for (off, present_px) in off.iter_mut().skip(1).zip(present_px) {
+            *off -= present_px;
+        }
+        let misfit = off.dot(&(information * &off));
+        (information * &wanted, misfit)
+    }
 }
 
 impl<'a, const P: usize> Adjustment<'a, P> {
@@ -466,28 +502,14 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         vector: &mut SVector<f64, P>,
     ) -> f64 {
         const FIRST: usize = POSE_PARAMETERS - 1;
-        let expected_px = lens
-            .distortion()
-            .map_or(&[][..], Distortion::coefficients_px);
-        let present_px = self.predictor.distortion.coefficients_px();
-        let ln_ratio = libm::log(lens.focal_length_px() / self.predictor.camera.focal_length_px());
-        // The unknowns: a change of ln f, and terms.
-        let wanted: DVector<f64> = DVector::from_iterator(
-            information.nrows(),
-            std::iter::once(ln_ratio).chain(expected_px.iter().copied()),
-        );
-        let mut off = wanted.clone();
-        for (off, present_px) in off.iter_mut().skip(1).zip(present_px) {
-            *off -= present_px;
-        }
-        let pull = information * &wanted;
+        let (pull, misfit) = self.predictor.pull_of(lens, information);
         for i in 0..information.nrows().min(P - FIRST) {
             vector[FIRST + i] += pull[i];
             for j in 0..information.ncols().min(P - FIRST) {
                 block[(FIRST + i, FIRST + j)] += information[(i, j)];
             }
         }
-        off.dot(&(information * &off))
+        misfit
     }
 
     /// Gauss-Newton steps, shortened where a whole one makes the fit worse or steps go to and fro, until a step moves the
@@ -502,7 +524,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             // By how much the step moves the predicted places, in standard errors.
             let moved = normal.root.l().tr_mul(&change);
             if moved.norm_squared() < converged * converged * equations {
-                self.take(&change, 1.0);
+                self.predictor.take(change.as_slice(), 1.0, self.model);
                 return Some(normal);
             }
             let before = self.predictor;
@@ -513,7 +535,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
             };
             moved_before = moved;
             normal = loop {
-                self.take(&change, share);
+                self.predictor.take(change.as_slice(), share, self.model);
                 match self.normal() {
                     Some(next) if next.misfit <= normal.misfit => break next,
                     _ if share > MIN_SHARE => {
@@ -541,30 +563,6 @@ impl<'a, const P: usize> Adjustment<'a, P> {
         }
         Some(change)
     }
-
-    /// Changes the parameters by a share of `change`.
-    fn take(&mut self, change: &SVector<f64, P>, share: f64) {
-        let turn = Vector3::new(change[0], change[1], change[2]) * share;
-        let changes_px = change.iter().skip(POSE_PARAMETERS);
-        let changes_px = changes_px.map(|change| share * change);
-        let model = self.model;
-        self.predictor
-            .change(turn, share * change[3], changes_px, model);
-    }
-
-    /// Observed minus predicted position of [`LANES`] stars or fewer. `None` if one is not imaged.
-    #[inline(always)]
-    pub fn residuals_px(&self, stars: &[MeasuredStar]) -> Option<[Lanes; 2]> {
-        let mut residuals_px = [[0.0; LANES]; 2];
-        for (lane, star) in stars.iter().enumerate().take(LANES) {
-            let predicted = self.predictor.predict(&star.icrs)?.observed.at;
-            let offset = self.predictor.camera.offset_of(&star.pixel);
-            for axis in 0..2 {
-                residuals_px[axis][lane] = offset[axis] - predicted[axis];
-            }
-        }
-        Some(residuals_px)
-    }
 }
 
 /// Mean and standard deviation of a term of lenses like `usual`, in pixels; with the axis where it is known.
@@ -584,19 +582,6 @@ pub(super) fn usual_term_px(
             (0.0, sigma * radius_px)
         }
     }
-}
-
-/// Fills `residuals_px` with those of all stars; `None` if one is not imaged.
-pub(super) fn all_residuals_px<const P: usize>(
-    adjustment: &Adjustment<P>,
-    residuals_px: &mut Vec<[f64; 2]>,
-) -> Option<()> {
-    residuals_px.clear();
-    for stars in adjustment.stars.chunks(LANES) {
-        let [x, y] = adjustment.residuals_px(stars)?;
-        residuals_px.extend((0..stars.len()).map(|lane| [x[lane], y[lane]]));
-    }
-    Some(())
 }
 
 /// The sums of the normal equations; `None` if a star is not imaged.

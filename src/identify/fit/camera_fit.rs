@@ -3,12 +3,10 @@
 //! matched stars + first guess → Gauss-Newton on (turn about x, y, z; ln f; distortion) → camera,
 //! attitude, covariance
 
-use super::adjustment::{
-    AXIS, Adjustment, LENS_PARAMETERS, MeasuredStar, Normal, POSE_PARAMETERS, all_residuals_px,
-};
+use super::adjustment::{AXIS, Adjustment, LENS_PARAMETERS, MeasuredStar, Normal, POSE_PARAMETERS};
 use crate::base::coords::{Camera, Icrs, Rotation, small_turn_rad};
 use crate::camera::{CameraModel, Distortion, DistortionModel, KnownLens};
-use nalgebra::{Matrix4, SMatrix};
+use nalgebra::{Matrix4, SMatrix, Vector4};
 
 /// Result of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,7 +159,10 @@ impl<const P: usize> Adjustment<'_, P> {
     }
 
     fn finish(self, normal: &Normal<P>, residuals_px: &mut Vec<[f64; 2]>) -> Option<CameraFit> {
-        all_residuals_px(&self, residuals_px)?;
+        residuals_px.clear();
+        for star in self.stars {
+            residuals_px.push(self.predictor.residual_px(star)?);
+        }
         let by_parameters = central_pose_by_parameters::<P>(self.camera());
         let of_all = normal.root.inverse();
         let covariance = by_parameters * of_all * by_parameters.transpose();
@@ -184,8 +185,6 @@ impl<const P: usize> Adjustment<'_, P> {
 /// central focal length, by the parameters of the fit: the attitude of the lens's axes, ln f and the
 /// terms of the distortion.
 fn central_pose_by_parameters<const P: usize>(camera: &CameraModel) -> SMatrix<f64, 4, P> {
-    /// Steps of the numerical derivatives: of ln f, and of terms in units of R.
-    const STEP: f64 = 1e-5;
     let mut by_parameters = SMatrix::zeros();
     for i in 0..POSE_PARAMETERS {
         by_parameters[(i, i)] = 1.0;
@@ -196,25 +195,35 @@ fn central_pose_by_parameters<const P: usize>(camera: &CameraModel) -> SMatrix<f
     if !camera.is_pinhole() || distortion.model() < DistortionModel::BrownConrady {
         return by_parameters;
     }
-    let to_lens = camera.lens_axes();
     by_parameters
         .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&to_lens.transpose());
-    let ln_central = libm::log(camera.central_focal_length_px());
+        .copy_from(&camera.lens_axes().transpose());
     for parameter in POSE_PARAMETERS - 1..P {
-        let step = match parameter.checked_sub(POSE_PARAMETERS) {
-            None => STEP,
-            Some(_) => STEP * distortion.radius_px(),
-        };
-        let moved = with_step(camera, distortion, parameter, step);
-        // The lens's axes stay, so the camera's turn the other way.
-        let turn = to_lens.tr_mul(&moved.lens_axes());
-        let turn_rad = small_turn_rad(&turn.transpose());
-        let ln_ratio = libm::log(moved.central_focal_length_px()) - ln_central;
-        let change = turn_rad.push(ln_ratio) / step;
-        by_parameters.set_column(parameter, &change);
+        let by_parameter = central_pose_by_parameter(camera, distortion, parameter);
+        by_parameters.set_column(parameter, &by_parameter);
     }
     by_parameters
+}
+
+/// The derivatives by one parameter of the lens.
+fn central_pose_by_parameter(
+    camera: &CameraModel,
+    distortion: &Distortion,
+    parameter: usize,
+) -> Vector4<f64> {
+    /// Steps of the numerical derivatives: of ln f, and of terms in units of R.
+    const STEP: f64 = 1e-5;
+    let step = match parameter.checked_sub(POSE_PARAMETERS) {
+        None => STEP,
+        Some(_) => STEP * distortion.radius_px(),
+    };
+    let moved = with_step(camera, distortion, parameter, step);
+    // The lens's axes stay, so the camera's turn the other way.
+    let turn = camera.lens_axes().tr_mul(&moved.lens_axes());
+    let turn_rad = small_turn_rad(&turn.transpose());
+    let ln_central = libm::log(camera.central_focal_length_px());
+    let ln_ratio = libm::log(moved.central_focal_length_px()) - ln_central;
+    turn_rad.push(ln_ratio) / step
 }
 
 /// `camera` with a parameter of the lens changed.

@@ -69,7 +69,7 @@ pub(crate) fn residuals_px(
     let predictor = PositionPredictor::new(camera, icrs_to_camera, camera.distortion_model());
     stars
         .iter()
-        .map(|star| residual_px(&predictor, star))
+        .map(|star| predictor.residual_px(star))
         .collect()
 }
 
@@ -117,7 +117,7 @@ pub(crate) fn fit_scale(
     let mut fit = LinearFit::new();
     for star in stars {
         let by_pose = predictor.predict(&star.icrs)?.by_pose;
-        let residual_px = residual_px(&predictor, star)?;
+        let residual_px = predictor.residual_px(star)?;
         for (by, residual_px) in by_pose.into_iter().zip(residual_px) {
             let row = Vector4::from(by) / star.sigma_px;
             fit.add(&row, 1.0, residual_px / star.sigma_px);
@@ -126,12 +126,6 @@ pub(crate) fn fit_scale(
     // The last is ln f: residuals are small, so one step is enough.
     let (change, covariance) = fit.solve_with_covariance()?;
     Some([change[3], covariance[(3, 3)].sqrt()])
-}
-
-fn residual_px(predictor: &PositionPredictor, star: &MeasuredStar) -> Option<[f64; 2]> {
-    let predicted = predictor.predict(&star.icrs)?.observed.at;
-    let [u, v] = predictor.camera().offset_of(&star.pixel);
-    Some([u - predicted[0], v - predicted[1]])
 }
 
 /// The frames of a joint fit at its present lens and attitudes.
@@ -264,7 +258,7 @@ impl Joint<'_> {
         let stars = self.frames.iter().zip(&self.predictors);
         let residuals_px = stars.map(|(frame, predictor)| {
             let stars = frame.stars.iter();
-            stars.map(|star| residual_px(predictor, star)).collect()
+            stars.map(|star| predictor.residual_px(star)).collect()
         });
         let residuals_px: Option<Vec<_>> = residuals_px.collect();
         Some(JointFit {

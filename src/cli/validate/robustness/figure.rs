@@ -3,7 +3,7 @@
 use super::rows::SweptRow;
 use crate::cli::plot::{
     Area, Axis, BLACK, BLUE as RIGHT, FONT, Figure, LETTERS_PX, Marks, ORANGE as WRONG, Panel,
-    PlotLayer, Sheet, chart_on, plot_error,
+    PlotLayer, Scale, Sheet, chart_on, plot_error,
 };
 use plotters::prelude::*;
 use starpipe::study::robustness::{CaseResult, VariedParameter};
@@ -81,7 +81,7 @@ impl Figure for RateTable<'_> {
         let last = counted.len() as f64;
         let mut builder = chart_on(area, BELOW_PX, LEFT_PX);
         let mut chart = builder
-            .build_cartesian_2d(lowest..100.05, last..0.0)
+            .build_cartesian_2d(Scale::linear(lowest..100.05), Scale::linear(last..0.0))
             .map_err(plot_error)?;
         chart
             .configure_mesh()
