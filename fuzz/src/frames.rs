@@ -47,7 +47,7 @@ pub fn exif(attributes: &[u8]) {
 
 /// A file in any format, of which each image is read.
 pub fn pages(bytes: &[u8]) {
-    let Ok(mut pages) = Pages::of(bytes.to_vec(), &mut buffers()) else {
+    let Ok(mut pages) = Pages::from_bytes(bytes.to_vec(), &mut buffers()) else {
         return;
     };
     for _ in 0..20 {
@@ -75,7 +75,7 @@ pub fn darks(bytes: &[u8]) {
     };
     let mut stack = DarkStack::new();
     for exposure_s in [0.1, 1.0, 10.0] {
-        let statistics = FrameStatistics::of("dark", &frame, Some(exposure_s));
+        let statistics = FrameStatistics::measure("dark", &frame, Some(exposure_s));
         if stack.add(&frame, statistics).is_err() {
             return;
         }

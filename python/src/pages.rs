@@ -51,7 +51,7 @@ impl Pages {
     #[new]
     fn new(py: Python<'_>, content: &[u8], name: String) -> PyResult<Self> {
         on_this_thread(py, |interrupt| {
-            let opened = frame::Pages::of(content.to_vec(), &mut buffers(interrupt));
+            let opened = frame::Pages::from_bytes(content.to_vec(), &mut buffers(interrupt));
             let pages = opened.map_err(|error| unread(error, &name))?;
             Ok(Self { name, pages })
         })
@@ -67,7 +67,7 @@ impl Pages {
         };
         let pages = &mut self.pages;
         let frame = on_this_thread(py, |interrupt| Ok(pages.image(&mut buffers(interrupt))))?;
-        let name = ImageName::of(Path::new(&self.name))
+        let name = ImageName::new(Path::new(&self.name))
             .page(number)
             .to_string();
         let image = match frame {

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::identify::Photometry;
 use starpipe::model::sensitivity::PredictionRow;
-use starpipe::study::defocus::{Caller, DarkNoise, DefocusReport, Noise, Plan};
+use starpipe::study::defocus::{Caller, DarkNoise, DefocusReport, Noise, DefocusPlan};
 use starpipe::study::robustness::{
-    Case, CaseResult, Mirrored, Protocol, TrialResults, run_one, standard_cases,
+    ProtocolCase, CaseResult, Mirrored, TrialProtocol, TrialResults, run_one, standard_cases,
 };
 use starpipe::study::validation::{self, Accumulator, FrameRecord, StarRecord, Validator};
 use starpipe::{Catalog, Interrupted, Workspace};
@@ -32,7 +32,7 @@ pub fn limit(py: Python<'_>, stated: Stated) -> PyResult<String> {
 /// The tables and the summary of a validation, as JSON.
 #[derive(Serialize)]
 struct Validation {
-    summary: validation::Summary,
+    summary: validation::ValidationSummary,
     frames: Vec<FrameRecord>,
     stars: Vec<StarRecord>,
 }
@@ -49,7 +49,7 @@ pub fn validate(
     scale_known: bool,
     threads: NonZeroUsize,
 ) -> PyResult<String> {
-    let protocol = validation::Protocol {
+    let protocol = validation::ValidationProtocol {
         site: None,
         setup: stated.setup()?,
         scale_known,
@@ -110,7 +110,7 @@ pub fn robustness(
 ) -> PyResult<String> {
     const MIN_TRUE_STARS: usize = 8;
     let [height_px, width_px] = lists.shape;
-    let base = Protocol {
+    let base = TrialProtocol {
         fov_deg: lists.fov_deg.unwrap_or_default(),
         width_px,
         height_px,
@@ -126,7 +126,7 @@ pub fn robustness(
     };
     let cases = match lists.fov_deg {
         None => standard_cases(&base),
-        Some(fov_deg) => vec![Case {
+        Some(fov_deg) => vec![ProtocolCase {
             label: format!("{fov_deg}° field"),
             protocol: base,
         }],
@@ -171,7 +171,7 @@ pub fn defocus(
         Some(stated) => of_camera(stated, noise, &vmag, trials)?,
         None => of_paper(noise(None), trials)?,
     };
-    let plan = Plan {
+    let plan = DefocusPlan {
         required_px: required_error_px,
         seed,
         ..plan
@@ -191,26 +191,26 @@ fn of_camera(
     noise: impl Fn(Option<f64>) -> Option<DarkNoise>,
     vmag: &[f64],
     trials: Option<usize>,
-) -> PyResult<Plan> {
+) -> PyResult<DefocusPlan> {
     let scenario = stated.scenario()?;
     let noise = match noise(Some(scenario.conditions.exposure_s)) {
         Some(darks) => Noise::of_good_pixels(darks, &scenario),
         None => Noise::of_camera(&scenario),
     };
     let noise = noise.map_err(exception)?;
-    let plan = Plan::of_camera(scenario, noise, vmag).map_err(exception)?;
+    let plan = DefocusPlan::of_camera(scenario, noise, vmag).map_err(exception)?;
     Ok(with_trials(plan, trials))
 }
 
-fn of_paper(darks: Option<DarkNoise>, trials: Option<usize>) -> PyResult<Plan> {
+fn of_paper(darks: Option<DarkNoise>, trials: Option<usize>) -> PyResult<DefocusPlan> {
     let noise = match darks {
         Some(darks) => Noise::of_all_pixels(darks).map_err(exception)?,
         None => Noise::of_paper(),
     };
-    Ok(with_trials(Plan::of_paper(noise), trials))
+    Ok(with_trials(DefocusPlan::of_paper(noise), trials))
 }
 
-fn with_trials(plan: Plan, trials: Option<usize>) -> Plan {
+fn with_trials(plan: DefocusPlan, trials: Option<usize>) -> DefocusPlan {
     match trials {
         Some(trials) => plan.with_trials(trials),
         None => plan,

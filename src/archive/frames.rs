@@ -61,7 +61,7 @@ impl FrameSummary {
         self.status == "identified"
     }
 
-    fn of(row: &Row) -> Self {
+    fn from_row(row: &Row) -> Self {
         let text = |column| text(row, column).to_owned();
         let number = |column| number(row, column);
         Self {
@@ -98,7 +98,7 @@ pub fn frames(archive: &Archive) -> Result<Vec<FrameSummary>, ArchiveError> {
     for part in archive.parts_with_frames() {
         let path = archive.frames_of(&part);
         let read = for_each_row(open(&path)?, &COLUMNS, |row| {
-            frames.push(FrameSummary::of(row));
+            frames.push(FrameSummary::from_row(row));
         });
         read.map_err(ArchiveError::table("reading", &path))?;
     }

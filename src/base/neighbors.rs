@@ -84,7 +84,7 @@ impl PointGrid {
         let (x, y) = (self.x, self.y);
         let cells = points
             .clone()
-            .map(|point| y.of(point.y) * along + x.of(point.x));
+            .map(|point| y.part_at(point.y) * along + x.part_at(point.x));
         self.cells.extend(cells.map(|cell| cell as u32));
         for &cell in &self.cells {
             self.starts[cell as usize] += 1;
@@ -170,12 +170,12 @@ impl Division {
     }
 
     /// The part in which a coordinate lies; outside the range, the nearest.
-    pub fn of(&self, at: f64) -> usize {
+    pub fn part_at(&self, at: f64) -> usize {
         (((at - self.from_px) * self.per_px).max(0.0) as u32 as usize).min(self.parts - 1)
     }
 
     fn near(&self, at: f64, radius_px: f64) -> RangeInclusive<usize> {
-        self.of(at - radius_px)..=self.of(at + radius_px)
+        self.part_at(at - radius_px)..=self.part_at(at + radius_px)
     }
 }
 

@@ -68,7 +68,7 @@ pub enum OptionNames {
 
 impl OptionNames {
     /// The name of an option.
-    fn of(self, option: Remedy) -> String {
+    fn name(self, option: Remedy) -> String {
         match self {
             Self::Words => option.name().to_owned(),
             Self::Flags => format!("--{}", option.name().replace('_', "-")),
@@ -80,7 +80,7 @@ impl OptionNames {
         if options.is_empty() {
             return String::new();
         }
-        let names: Vec<String> = options.iter().map(|option| self.of(*option)).collect();
+        let names: Vec<String> = options.iter().map(|option| self.name(*option)).collect();
         format!("; see {}", names.join(", "))
     }
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Maximum share of unusable pixels in a master or a list of hot pixels. With more, the file is
 /// assumed to be wrong.
-pub const MAX_BAD_SHARE: f64 = 0.1;
+pub const MAX_BAD_FRACTION: f64 = 0.1;
 
 /// Error of calibrating a frame.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +34,7 @@ pub enum CalibrationError {
         of: String,
     },
     /// Too many pixels of a master are unusable.
-    #[error("{what} {name}: found {bad} of {pixels} pixels {found}, expected at most {} %", MAX_BAD_SHARE * 100.0)]
+    #[error("{what} {name}: found {bad} of {pixels} pixels {found}, expected at most {} %", MAX_BAD_FRACTION * 100.0)]
     TooManyBad {
         /// `the dark`, `the flat`, `the hot pixels`.
         what: &'static str,
@@ -88,7 +88,7 @@ pub enum CalibrationError {
     NothingLeft,
 }
 
-/// Refuses a master with more than [`MAX_BAD_SHARE`] unusable pixels.
+/// Refuses a master with more than [`MAX_BAD_FRACTION`] unusable pixels.
 pub(super) fn check_bad(
     what: &'static str,
     name: &str,
@@ -97,7 +97,7 @@ pub(super) fn check_bad(
     found: &'static str,
 ) -> Result<(), CalibrationError> {
     let pixels = frame.width * frame.height;
-    if bad as f64 <= MAX_BAD_SHARE * pixels as f64 {
+    if bad as f64 <= MAX_BAD_FRACTION * pixels as f64 {
         return Ok(());
     }
     Err(CalibrationError::TooManyBad {

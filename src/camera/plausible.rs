@@ -70,7 +70,7 @@ impl CameraModel {
         /// Focal lengths in half diagonals of the frame: from beyond any fisheye to fields of 2″.
         const FOCAL_LENGTHS: [f64; 2] = [0.02, 2e5];
         /// The ratio of the focal lengths along two directions.
-        const MOST_STRETCH: f64 = 1.25;
+        const MAX_STRETCH: f64 = 1.25;
         let [low_px, high_px] = FOCAL_LENGTHS.map(|of_radius| of_radius * self.radius_px());
         let found_px = self.focal_length_px();
         if !(low_px..=high_px).contains(&found_px) {
@@ -89,7 +89,7 @@ impl CameraModel {
             });
         }
         let ratio = self.focal_length_ratio();
-        if !(1.0..=MOST_STRETCH).contains(&ratio) {
+        if !(1.0..=MAX_STRETCH).contains(&ratio) {
             return Err(ImplausibleLens::Stretch { ratio });
         }
         Ok(())

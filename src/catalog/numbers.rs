@@ -136,7 +136,7 @@ impl StarNumbers {
     }
 
     /// The numbers of the star with a Skymap or Hipparcos number; none of any other star.
-    pub(super) fn of(id: StarId) -> Self {
+    pub(super) fn find(id: StarId) -> Self {
         let Some(numbers) = NumberColumns::table() else {
             return Self::default();
         };
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn bright_stars_have_the_numbers_that_everyone_knows() {
-        let numbers = |skymap| StarNumbers::of(StarId::Skymap(skymap));
+        let numbers = |skymap| StarNumbers::find(StarId::Skymap(skymap));
         let known = |hip, hd, hr, sao| StarNumbers {
             hip: Some(hip),
             hd: Some(hd),
@@ -176,7 +176,7 @@ mod tests {
         let by_hip = |component| HipparcosId::new(32_349, component).unwrap();
         for component in [None, Some(b'A')] {
             let id = StarId::Hipparcos(by_hip(component));
-            assert_eq!(StarNumbers::of(id), sirius);
+            assert_eq!(StarNumbers::find(id), sirius);
         }
     }
 
@@ -187,7 +187,7 @@ mod tests {
             StarId::Skymap(0),
             StarId::Skymap(u32::MAX),
         ] {
-            assert_eq!(StarNumbers::of(id), StarNumbers::default());
+            assert_eq!(StarNumbers::find(id), StarNumbers::default());
         }
     }
 
@@ -218,7 +218,7 @@ mod tests {
                 continue;
             };
             let id = StarId::Hipparcos(HipparcosId::new(hip, None).unwrap());
-            let by_hip = super::super::proper_names::of(id);
+            let by_hip = super::super::proper_names::find(id);
             assert_eq!(by_hip, catalog.proper_name(star));
         }
     }

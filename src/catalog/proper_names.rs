@@ -19,7 +19,7 @@ struct ProperName {
 }
 
 /// The proper name of a star that is known by its Skymap or Hipparcos number.
-pub(super) fn of(id: StarId) -> Option<&'static str> {
+pub(super) fn find(id: StarId) -> Option<&'static str> {
     match id {
         StarId::Skymap(number) => {
             let by_number = &names().by_skymap;
@@ -86,7 +86,7 @@ mod tests {
             let apart_mag = f64::from(star.v_mag) - number(4);
             let same = apart_mag.abs() < SAME_V_MAG || cells[2] == LONG_PERIOD_VARIABLE;
             assert!(same, "{line}: {}", star.v_mag);
-            assert_eq!(of(id), Some(cells[2]));
+            assert_eq!(find(id), Some(cells[2]));
             rows += 1;
         }
         assert_eq!(names().by_skymap.len(), rows);
@@ -139,14 +139,14 @@ mod tests {
         let rigel = HipparcosId::new(24436, None)
             .map(StarId::Hipparcos)
             .unwrap();
-        assert_eq!(of(rigel), Some("Rigel"));
-        assert_eq!(of(StarId::Skymap(5_140_095)), Some("Rigel"));
+        assert_eq!(find(rigel), Some("Rigel"));
+        assert_eq!(find(StarId::Skymap(5_140_095)), Some("Rigel"));
         for id in [
             StarId::Skymap(1),
             StarId::Number(24436),
             StarId::Named(5_140_095),
         ] {
-            assert_eq!(of(id), None);
+            assert_eq!(find(id), None);
         }
     }
 }

@@ -128,7 +128,7 @@ impl Catalog {
     /// # Panics
     /// If there is no such star.
     pub fn proper_name(&self, star: StarIndex) -> Option<&'static str> {
-        proper_names::of(self.star(star).id)
+        proper_names::find(self.star(star).id)
     }
 
     /// All names of a star, the proper one first: `"Polaris (1 alp UMi)"`.
@@ -160,7 +160,7 @@ impl Catalog {
     /// # Panics
     /// If there is no such star.
     pub fn numbers_of(&self, star: StarIndex) -> StarNumbers {
-        StarNumbers::of(self.star(star).id)
+        StarNumbers::find(self.star(star).id)
     }
 
     /// The index of the star `id`; a linear search.

@@ -60,7 +60,7 @@ pub(super) enum Brightness {
 
 impl Brightness {
     /// Magnitude and flux of a number in the column.
-    fn of(self, value: f64) -> (f64, Option<f64>) {
+    fn mag_and_flux(self, value: f64) -> (f64, Option<f64>) {
         match self {
             Self::Flux => (instrumental_mag(value), Some(value)),
             Self::JohnsonV | Self::Mag if value.abs() < NO_MAG => (value, None),
@@ -69,7 +69,7 @@ impl Brightness {
     }
 
     fn is_usable(self, value: f64) -> bool {
-        self.of(value).0.is_finite()
+        self.mag_and_flux(value).0.is_finite()
     }
 }
 
@@ -169,7 +169,7 @@ impl CentroidColumns {
         let x = number(&self.x) - self.first_pixel;
         let y = number(&self.y) - self.first_pixel;
         let (mag, flux) = match &self.brightness {
-            Some((column, kind)) => kind.of(number(column)),
+            Some((column, kind)) => kind.mag_and_flux(number(column)),
             None => (ListedCentroid::mag_of_rank(rank), None),
         };
         let mut centroid = ListedCentroid {

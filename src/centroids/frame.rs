@@ -32,7 +32,7 @@ pub(crate) struct ListFrame {
 
 impl ListFrame {
     /// The frame of usable centroids, taken by a camera whose frames have one of `sizes`.
-    pub fn of(list: &CentroidList, sizes: &[Size]) -> Result<Self, CentroidListError> {
+    pub fn from_list(list: &CentroidList, sizes: &[Size]) -> Result<Self, CentroidListError> {
         let stated = agreed_size([list.width, list.height], sizes)?;
         for centroid in &list.centroids {
             check_inside(&centroid.position, stated)
@@ -98,13 +98,13 @@ impl CentroidExtent {
         /// Steps of the probability of a frame that is whole, and of one that is not.
         const STEPS: u32 = 400;
         /// A list of a part has at least this much of its frame.
-        const LEAST_PART: f64 = 1.0 / 3.0;
+        const MIN_PART: f64 = 1.0 / 3.0;
         // The gap at the other border, at the least as the mean of such gaps.
         let gap_px = self.gap_px + self.side_px / self.stars.max(1) as f64;
         let offsets = (0..STEPS).flat_map(|step| {
             let share = (f64::from(step) + 0.5) / f64::from(STEPS);
             let whole_px = -gap_px * libm::log(share) / 2.0;
-            let part = LEAST_PART + share * (1.0 - LEAST_PART);
+            let part = MIN_PART + share * (1.0 - MIN_PART);
             [whole_px, self.side_px * (1.0 / part - 1.0) / 2.0]
         });
         let misfit = |offset_px: f64| {

@@ -30,7 +30,7 @@ pub struct LeftOut {
 }
 
 impl LeftOut {
-    pub(super) fn of(problems: &[(RowProblem, u64)]) -> Vec<Self> {
+    pub(super) fn summarize(problems: &[(RowProblem, u64)]) -> Vec<Self> {
         let all = [
             RowProblem::NoNumber,
             RowProblem::NoFlux,

@@ -111,7 +111,7 @@ impl CentroidList {
             centroids: kept.into_iter().map(|(centroid, _)| centroid).collect(),
             ..self.clone()
         };
-        (list, LeftOut::of(&problems))
+        (list, LeftOut::summarize(&problems))
     }
 
     /// The star field of a list that is sorted by brightness; `places` is where the catalogue's stars

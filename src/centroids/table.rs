@@ -98,7 +98,7 @@ impl CentroidList {
     pub fn parse(table: &[u8], options: &CentroidListOptions) -> Result<Self, CentroidListError> {
         let table = files::without_byte_order_mark(table)
             .map_err(|error| CentroidListError::of_list(error.to_string()))?;
-        let ListText { text, separator } = ListText::of(table);
+        let ListText { text, separator } = ListText::decode(table);
         let mut reader = self::reader(&text, separator);
         let headings = reader.headers().map_err(not_a_table)?;
         let rows = || self::reader(&text, separator).into_records().flatten();
@@ -268,7 +268,7 @@ mod tests {
     }
 
     fn guessed(list: &CentroidList) -> [usize; 2] {
-        ListFrame::of(list, &[]).unwrap().size.sides()
+        ListFrame::from_list(list, &[]).unwrap().size.sides()
     }
 
     fn error(text: &str) -> String {

@@ -18,19 +18,19 @@ pub(super) struct ListText<'a> {
 
 impl<'a> ListText<'a> {
     /// The list in `bytes`, which have no byte order mark.
-    pub fn of(bytes: &'a [u8]) -> Self {
+    pub fn decode(bytes: &'a [u8]) -> Self {
         match without_mark_of_heading(bytes) {
             Some(text) => {
-                let ListText { text, separator } = ListText::of(&text);
+                let ListText { text, separator } = ListText::decode(&text);
                 let text = text.into_owned().into();
                 Self { text, separator }
             }
-            None => Self::of_plain(bytes),
+            None => Self::decode_plain(bytes),
         }
     }
 
     /// The list in `bytes`, whose heading is no comment, or a numbered one.
-    fn of_plain(bytes: &'a [u8]) -> Self {
+    fn decode_plain(bytes: &'a [u8]) -> Self {
         let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
         let heading = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"));
         let heading = heading.unwrap_or_default();
@@ -130,8 +130,8 @@ fn numbered_column(line: &str) -> Option<(usize, &str)> {
 mod tests {
     use super::*;
 
-    fn of(text: &str) -> (String, char) {
-        let list = ListText::of(text.as_bytes());
+    fn decoded(text: &str) -> (String, char) {
+        let list = ListText::decode(text.as_bytes());
         let text = String::from_utf8(list.text.into_owned()).unwrap();
         (text, list.separator.into())
     }
@@ -145,9 +145,9 @@ mod tests {
             ("x\n", ','),
             ("", ','),
         ] {
-            assert_eq!(of(text), (text.to_owned(), separator), "{text}");
+            assert_eq!(decoded(text), (text.to_owned(), separator), "{text}");
         }
-        let (text, separator) = of("# %ECSV 1.0\nid  x y\n 1 2.5 3\n");
+        let (text, separator) = decoded("# %ECSV 1.0\nid  x y\n 1 2.5 3\n");
         assert_eq!(
             (text.as_str(), separator),
             ("# %ECSV 1.0\nid,x,y\n1,2.5,3", ',')
@@ -163,10 +163,10 @@ mod tests {
             ),
             ("#x,y,flux\n1.5,2.5,3\n", "x,y,flux\n1.5,2.5,3\n"),
         ] {
-            assert_eq!(of(list), (expected.to_owned(), ','));
+            assert_eq!(decoded(list), (expected.to_owned(), ','));
         }
         let remark = "# three words here\nx,y,flux\n1,2,3\n";
-        assert_eq!(of(remark).0, remark);
+        assert_eq!(decoded(remark).0, remark);
     }
 
     #[test]
@@ -175,6 +175,6 @@ mod tests {
                     #   4 X_IMAGE    Object position [pixel]\n  1  5.0 6.0  7.5\n";
         let expected = "#   1 NUMBER     Running object number\n#   2 FLUX_APER  Fluxes [count]\n\
                         NUMBER,FLUX_APER,,X_IMAGE\n1,5.0,6.0,7.5";
-        assert_eq!(of(list).0, expected);
+        assert_eq!(decoded(list).0, expected);
     }
 }

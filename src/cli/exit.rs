@@ -50,7 +50,7 @@ pub(crate) enum Exit {
 
 impl Exit {
     /// [`Exit::Failure`] if something failed, else [`Exit::Success`].
-    pub(crate) fn of(failed: bool) -> Self {
+    pub(crate) fn failure_if(failed: bool) -> Self {
         if failed { Self::Failure } else { Self::Success }
     }
 }

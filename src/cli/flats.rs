@@ -51,7 +51,7 @@ pub(crate) struct FlatsArgs {
 
 /// `starpipe flats`
 pub(crate) fn flats(arguments: FlatsArgs) -> Result<CommandOutput, CommandError> {
-    let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
+    let (frames, failed) = FrameList::expand(arguments.frames.frames.clone())?.reported();
     if let Some(directory) = &arguments.out {
         let inputs: Vec<_> = frames.iter().chain(&arguments.dark).cloned().collect();
         overwrite::check_results(&inputs, &[directory.join(MASTER)])?;
@@ -78,7 +78,7 @@ pub(crate) fn flats(arguments: FlatsArgs) -> Result<CommandOutput, CommandError>
             OutputFormat::Json => json_line(&flats.report())?,
             OutputFormat::Csv => csv_table(flats.frame_rows())?,
         },
-        exit: Exit::of(failed || unread > 0),
+        exit: Exit::failure_if(failed || unread > 0),
     };
     Ok(outcome.if_written(all_written))
 }

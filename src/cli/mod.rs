@@ -47,7 +47,7 @@ use std::process::ExitCode;
 
 /// Runs the command that the command line names.
 pub(crate) fn run() -> ExitCode {
-    let mut program = short_help::of(Arguments::command());
+    let mut program = short_help::apply(Arguments::command());
     let words = first_word::completed(std::env::args_os(), &mut program);
     let matches = program.get_matches_from(words.unwrap_or_else(|error| error.exit()));
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());

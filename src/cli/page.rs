@@ -110,7 +110,7 @@ pub(crate) fn codes_note<'a>(codes: impl Iterator<Item = (&'a str, u64)>) -> Opt
 }
 
 /// Frames that are read for small pictures: many may be gone, or no images.
-const MOST_TRIED: usize = 4 * Thumbnail::MOST;
+const MAX_TRIED: usize = 4 * Thumbnail::MAX;
 
 /// Small pictures of frames that are named as files, or as images of files (`mosaic.fits[1]`), each with what is
 /// to be said of it: the first ones of those that can be read.
@@ -125,9 +125,9 @@ pub(crate) fn thumbnails(frames: impl IntoIterator<Item = (String, String)>) -> 
     };
     frames
         .into_iter()
-        .take(MOST_TRIED)
+        .take(MAX_TRIED)
         .filter_map(picture)
-        .take(Thumbnail::MOST)
+        .take(Thumbnail::MAX)
         .collect()
 }
 

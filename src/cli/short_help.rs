@@ -104,7 +104,7 @@ const STUDY: [&str; 25] = [
 
 /// The program with help on one screen for `-h`. A command is changed when it is called: to change all
 /// takes longer than a frame.
-pub(super) fn of(program: Command) -> Command {
+pub(super) fn apply(program: Command) -> Command {
     let names: Vec<String> = program
         .get_subcommands()
         .map(|c| c.get_name().to_owned())
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn short_help_fits_on_a_screen_and_long_help_has_all() {
-        let mut program = of(Arguments::command()).term_width(80);
+        let mut program = apply(Arguments::command()).term_width(80);
         program.build();
         for command in program.get_subcommands_mut() {
             let lines = command.render_help().to_string().lines().count();

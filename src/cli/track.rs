@@ -104,7 +104,7 @@ impl TrackRun<'_> {
             let flow = if is_stdin(input) {
                 self.listed()?
             } else {
-                let (paths, failed) = FrameList::of(vec![input.clone()])?.reported();
+                let (paths, failed) = FrameList::expand(vec![input.clone()])?.reported();
                 self.tally.failed += usize::from(failed);
                 let mut paths = paths.iter();
                 paths.try_for_each(|path| self.frame(path))

@@ -29,7 +29,7 @@ pub(crate) struct Contrast {
 
 impl Contrast {
     /// That of the pixel in column `x` and row `y`.
-    pub fn of(view: &View<'_>, background: &Mesh, x: usize, y: usize) -> Self {
+    pub fn measure(view: &View<'_>, background: &Mesh, x: usize, y: usize) -> Self {
         let (level, noise) = background.at(x as f32, y as f32);
         let above = |x: Option<usize>, y: Option<usize>| match (x, y) {
             (Some(x), Some(y)) if x < view.width && y < view.height => {
@@ -56,7 +56,7 @@ impl Contrast {
             .filter(|pixel| !value(pixel).is_nan())
             .max_by(|a, b| value(a).total_cmp(&value(b)));
         let (x, y) = brightest.unwrap_or((x, y));
-        Self::of(view, background, x, y)
+        Self::measure(view, background, x, y)
     }
 
     /// In how many of both directions the light beside the pixel is less than spots of `spot_px`

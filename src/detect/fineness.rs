@@ -11,7 +11,7 @@ const RMS_PER_BEND: f32 = 0.037_267_8;
 /// Largest scatter of the background about the mesh in most cells, over the noise of the filtered frame.
 const LARGEST_SCATTER: f32 = 0.5;
 /// Most cells: this share of them.
-const MOST: f32 = 0.75;
+const MAX: f32 = 0.75;
 /// Finer cells count where they lower the limit to this part of it: at edges they make it worse.
 const WORTHWHILE: f64 = 0.95;
 
@@ -76,10 +76,10 @@ impl CellSize {
 /// Least side of a cell for spots of this standard deviation, all in pixels.
 pub(crate) fn least_cell_px(spot_sigma_px: f64) -> f64 {
     /// Over the size of a spot: the light of bright stars would be in the background.
-    const LEAST_PER_SPOT: f64 = 16.0;
+    const MIN_PER_SPOT: f64 = 16.0;
     /// With fewer pixels the noise of the background would matter.
-    const LEAST_PX: f64 = 16.0;
-    (LEAST_PER_SPOT * spot_sigma_px).max(LEAST_PX)
+    const MIN_PX: f64 = 16.0;
+    (MIN_PER_SPOT * spot_sigma_px).max(MIN_PX)
 }
 
 /// The side of the cells that the bends of a background with cells of `cell_px` ask for.
@@ -93,7 +93,7 @@ fn finer_px(
     let scatter = |bend: f32| bend * RMS_PER_BEND / pass.matched_gain as f32;
     sorted.clear();
     sorted.extend(background.mesh.bends_over_noise().map(scatter));
-    let at = (MOST * sorted.len() as f32) as usize;
+    let at = (MAX * sorted.len() as f32) as usize;
     if at >= sorted.len() {
         return cell_px;
     }

@@ -250,7 +250,7 @@ fn measure_spots(
     let shape = StarShape::measure(&maps, peaks);
     shape.merge_peaks(peaks, regions);
     input.view.check()?;
-    let psf = if stars.is_departure {
+    let psf = if stars.is_non_gaussian {
         measure_psf(&maps, peaks, &mut stars, fits)
     } else {
         None

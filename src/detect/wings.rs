@@ -38,13 +38,13 @@ const MIN_STARS: usize = 3;
 /// Most other sources near a star.
 const MAX_OTHERS: usize = 16;
 /// Smallest share of the light that is corrected: below, the spot is as good as its model.
-const MIN_SHARE: f64 = 0.02;
+const MIN_FRACTION: f64 = 0.02;
 /// Its significance, as a normal deviate.
 const SIGNIFICANT_SIGMAS: f64 = 5.0;
 /// Shares of the light that wings may have, all as likely before they are measured.
-const LIKELY_SHARES: [f64; 2] = [-0.05, 0.20];
+const LIKELY_FRACTIONS: [f64; 2] = [-0.05, 0.20];
 /// Beyond these shares what was measured are no wings: the background around the stars, or a spot that is not theirs.
-const POSSIBLE_SHARES: [f64; 2] = [-0.15, 0.40];
+const POSSIBLE_FRACTIONS: [f64; 2] = [-0.15, 0.40];
 /// Share of the frames that have such wings.
 const LIKELY_FRAMES: f64 = 0.1;
 /// Stars farther than this many standard errors from the median do not count.
@@ -82,7 +82,7 @@ pub(super) fn measure_wings(
     let (Some(core), Some(beyond)) = (of_part(0), beyond(&rings)) else {
         return FluxScale::default();
     };
-    FluxScale::of(&Estimate {
+    FluxScale::estimate(&Estimate {
         value: core.value - 1.0 + beyond.value,
         sigma: libm::hypot(core.sigma, beyond.sigma),
     })
@@ -90,20 +90,20 @@ pub(super) fn measure_wings(
 
 impl FluxScale {
     /// That of a frame whose spots lack this share of the light of the fitted ones.
-    fn of(lacking: &Estimate) -> Self {
+    fn estimate(lacking: &Estimate) -> Self {
         let Estimate { value, sigma } = *lacking;
-        let [least, most] = POSSIBLE_SHARES;
+        let [least, most] = POSSIBLE_FRACTIONS;
         if !(least..=most).contains(&value) {
             return Self {
                 wings: None,
                 sigma: value.clamp(least, most).abs(),
             };
         }
-        let [least, most] = LIKELY_SHARES;
+        let [least, most] = LIKELY_FRACTIONS;
         // The probabilities of what was measured, without wings and with any.
         let without = (1.0 - LIKELY_FRAMES) * normal_density(value / sigma) / sigma;
         let with = LIKELY_FRAMES / (most - least);
-        if with > without && value > MIN_SHARE.max(SIGNIFICANT_SIGMAS * sigma) {
+        if with > without && value > MIN_FRACTION.max(SIGNIFICANT_SIGMAS * sigma) {
             return Self {
                 wings: Some(Wings {
                     share: value,
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn wings_that_may_be_chance_are_in_the_error_alone() {
-        let of = |value: f64, sigma: f64| FluxScale::of(&Estimate { value, sigma });
+        let of = |value: f64, sigma: f64| FluxScale::estimate(&Estimate { value, sigma });
         assert!(of(0.1, 0.01).wings.is_some() && of(-0.04, 0.005).wings.is_none());
         assert!(of(0.04, 0.02).wings.is_none());
         let ordinary = of(0.003, 0.003);

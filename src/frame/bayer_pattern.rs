@@ -99,7 +99,7 @@ pub(super) enum Diagonal {
 
 impl Diagonal {
     /// That of the pixel in column `x`, row `y`.
-    pub fn of(x: usize, y: usize) -> Self {
+    pub fn at(x: usize, y: usize) -> Self {
         if (x + y).is_multiple_of(2) {
             Self::Falling
         } else {

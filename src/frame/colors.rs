@@ -1,10 +1,10 @@
 //! The colors of a picture, to draw it as it is: measurements use luminance alone.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::limits::MAX_FILE_BYTES;
+use super::read_budget::ReadBudget;
 use super::reader::{Buffers, no_panic};
 use crate::base::files;
 use crate::base::size::Size;
@@ -45,7 +45,7 @@ impl Colors {
 
     /// [`Self::read`] for the content of a file.
     pub fn decode(bytes: &[u8], frame: &Frame, buffers: &mut Buffers) -> Option<Self> {
-        let account = buffers.account(bytes.len()).ok()?;
+        let account = buffers.budget(bytes.len()).ok()?;
         let (size, pixels) = no_panic(|| decode(bytes, &account)).ok()??;
         if size != frame.stored_size() {
             return None;
@@ -60,7 +60,7 @@ impl Colors {
 type Decoded = Option<(Size, Vec<[u16; 3]>)>;
 
 fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
-    Ok(match FrameFormat::of(bytes) {
+    Ok(match FrameFormat::detect(bytes) {
         Some(FrameFormat::Png | FrameFormat::Jpeg | FrameFormat::Bmp | FrameFormat::Pnm) => {
             of_picture(bytes, account)?
         }

@@ -16,11 +16,11 @@ const MAX_LN_CHANCE: f64 = -14.0;
 /// Fewest rows that are taken for defective: where a defect ends, light by chance has its value.
 const MIN_ROWS: usize = 32;
 /// More columns than this share are no defects: the picture is drawn, or black.
-const MAX_SHARE: f64 = 0.2;
+const MAX_FRACTION: f64 = 0.2;
 /// The nearest column with light is at most so far away, on both sides.
 const REACH: usize = 3;
 /// Share of neighboring rows with the same value from which on a column has no light.
-const MAX_EQUAL_SHARE: f64 = 0.5;
+const MAX_EQUAL_FRACTION: f64 = 0.5;
 
 /// Rows of a column that hold one value instead of light.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,12 +35,12 @@ impl Frame<'_> {
     /// The columns that hold one value over many rows while those beside them do not, from the left.
     pub fn defective_columns(&self) -> Vec<DefectiveColumn> {
         let runs = match &self.pixels {
-            Pixels::U8(values) => LongestRuns::of(values, self.width),
-            Pixels::U16(values) => LongestRuns::of(values, self.width),
-            Pixels::F32(values) => LongestRuns::of(values, self.width),
+            Pixels::U8(values) => LongestRuns::measure(values, self.width),
+            Pixels::U16(values) => LongestRuns::measure(values, self.width),
+            Pixels::F32(values) => LongestRuns::measure(values, self.width),
         };
         let suspects = runs.suspects();
-        if suspects.is_empty() || suspects.len() as f64 > MAX_SHARE * self.width as f64 {
+        if suspects.is_empty() || suspects.len() as f64 > MAX_FRACTION * self.width as f64 {
             return Vec::new();
         }
         let highest = self.pixels.highest();
@@ -86,7 +86,7 @@ impl Frame<'_> {
             let equal = pairs
                 .filter(|&y| self.at(x, y) == self.at(x, y - 1))
                 .count();
-            (equal as f64) < MAX_EQUAL_SHARE * rows.len() as f64
+            (equal as f64) < MAX_EQUAL_FRACTION * rows.len() as f64
         };
         let mut left = x.saturating_sub(REACH)..x;
         let mut right = x + 1..(x + 1 + REACH).min(self.width);
@@ -100,11 +100,11 @@ struct LongestRuns {
     /// Rows that are compared with the last one.
     rows: usize,
     /// Share of the pixels that have the value of the last row's.
-    equal_share: f64,
+    equal_fraction: f64,
 }
 
 impl LongestRuns {
-    fn of<T: Copy + PartialEq>(values: &[T], width: usize) -> Self {
+    fn measure<T: Copy + PartialEq>(values: &[T], width: usize) -> Self {
         let mut runs = vec![0i16; width];
         let mut longest = vec![0i16; width];
         let rows = || values.chunks_exact(width).step_by(ROW_STEP);
@@ -128,14 +128,14 @@ impl LongestRuns {
         Self {
             longest,
             rows: pairs().count(),
-            equal_share: equal.count() as f64 / pixels.max(1) as f64,
+            equal_fraction: equal.count() as f64 / pixels.max(1) as f64,
         }
     }
 
     /// The columns with a run that noise does not make.
     fn suspects(&self) -> Vec<usize> {
         let pixels = (self.rows * self.longest.len()).max(1) as f64;
-        let chance = self.equal_share.clamp(1e-3, 0.999);
+        let chance = self.equal_fraction.clamp(1e-3, 0.999);
         let run = (MAX_LN_CHANCE - libm::log(pixels)) / libm::log(chance);
         let min_run = MIN_RUN.max(run.ceil() as usize);
         let columns = self.longest.iter().enumerate();

@@ -1,9 +1,9 @@
 //! Files compressed with gzip or bzip2.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::limits::MAX_FILE_BYTES;
+use super::read_budget::ReadBudget;
 use bzip2::read::MultiBzDecoder;
 use flate2::read::MultiGzDecoder;
 use std::io::{self, ErrorKind, Read};
@@ -66,7 +66,7 @@ fn decoder(bytes: &[u8], format: FrameFormat) -> Box<dyn Read + '_> {
 pub(super) fn format_inside(head: &[u8], format: FrameFormat) -> (Option<FrameFormat>, Vec<u8>) {
     const SIGNATURE_BYTES: usize = 16;
     let inside = unpack_beginning(decoder(head, format), SIGNATURE_BYTES);
-    let format = FrameFormat::of(&inside).filter(|format| !format.is_compressed());
+    let format = FrameFormat::detect(&inside).filter(|format| !format.is_compressed());
     (format, inside)
 }
 

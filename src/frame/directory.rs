@@ -2,10 +2,10 @@
 
 use super::compressed::format_inside;
 use super::error::FrameError;
-use super::foreign;
 use super::format::FrameFormat;
 use super::limits::HEAD_BYTES;
 use super::other_file::OtherFile;
+use super::unsupported_formats;
 use crate::base::files;
 use memchr::memmem;
 use std::io::{self, Read};
@@ -29,16 +29,16 @@ pub fn files_in(directory: &Path) -> Result<Vec<PathBuf>, FrameError> {
     if !frames.is_empty() {
         return Ok(frames);
     }
-    Err(foreign_file(&files).unwrap_or_else(|| {
+    Err(unsupported_file(&files).unwrap_or_else(|| {
         let nothing = FrameError::NoFrames { files: files.len() };
         nothing.in_file(directory)
     }))
 }
 
 /// The error of the first file in a format that is known but not read.
-pub(super) fn foreign_file(files: &[PathBuf]) -> Option<FrameError> {
+pub(super) fn unsupported_file(files: &[PathBuf]) -> Option<FrameError> {
     files.iter().find_map(|path| {
-        let known = foreign::of(&head_of(path).ok()?)?;
+        let known = unsupported_formats::detect(&head_of(path).ok()?)?;
         Some(FrameError::from(known).in_file(path))
     })
 }
@@ -66,7 +66,7 @@ pub(super) fn all_files_in(directory: &Path) -> io::Result<Vec<PathBuf>> {
 /// starpipe.
 pub fn is_overlay(head: &[u8]) -> bool {
     let (keyword, text) = OVERLAY_TEXT;
-    let mark = match FrameFormat::of(head) {
+    let mark = match FrameFormat::detect(head) {
         Some(FrameFormat::Png) => [b"tEXt", keyword.as_bytes(), b"\0", text.as_bytes()].concat(),
         // A comment.
         Some(FrameFormat::Jpeg) => {
@@ -104,7 +104,7 @@ pub fn is_table(head: &[u8]) -> bool {
 
 fn is_created_by(head: &[u8], creator: &str) -> bool {
     let card = format!("CREATOR = '{creator}");
-    FrameFormat::of(head) == Some(FrameFormat::Fits)
+    FrameFormat::detect(head) == Some(FrameFormat::Fits)
         && memmem::find(head, card.as_bytes()).is_some()
 }
 
@@ -146,7 +146,7 @@ pub(super) fn other_kind(path: &Path) -> Option<OtherFile> {
         return Some(OtherFile::Product);
     }
     let head = head_of(path).ok()?;
-    let (is_image, is_product) = match FrameFormat::of(&head) {
+    let (is_image, is_product) = match FrameFormat::detect(&head) {
         Some(FrameFormat::Png | FrameFormat::Jpeg) => (true, is_overlay(&head)),
         Some(FrameFormat::Fits) => {
             let is_product = is_calibration_frame(&head) || is_copy(&head) || is_table(&head);
@@ -164,7 +164,7 @@ pub(super) fn other_kind(path: &Path) -> Option<OtherFile> {
     match (is_image, is_product) {
         (_, true) => Some(OtherFile::Product),
         (true, false) => None,
-        (false, false) => Some(match foreign::of(&head) {
+        (false, false) => Some(match unsupported_formats::detect(&head) {
             Some(known) if known.is_video() => OtherFile::Video,
             Some(_) => OtherFile::OtherFormat,
             None if is_named_as_a_video(path) => OtherFile::Video,

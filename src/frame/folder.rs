@@ -21,7 +21,7 @@
 //! (`allsky-keogram_ccd1_20260115_night.jpg`, `allsky-startrail_ccd1_20260115_night.jpg`),
 //! CroatianMeteorNetwork/RMS (`XX0001_20260115_203000_captured_stack.jpg`, `_thumbs.jpg`, `_fieldsums.png`).
 
-use super::directory::{all_files_in, foreign_file, head_of, other_kind};
+use super::directory::{all_files_in, head_of, other_kind, unsupported_file};
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::limits::MAX_FILE_BYTES;
@@ -77,7 +77,7 @@ impl Folder {
     ///
     /// # Errors
     /// As for [`files_in`](super::files_in).
-    pub fn of(directory: &Path, cameras: Cameras) -> Result<Self, FrameError> {
+    pub fn read(directory: &Path, cameras: Cameras) -> Result<Self, FrameError> {
         let files = files_below(directory, 0)
             .map_err(|error| FrameError::from(error).in_file(directory))?;
         let folder = Self::sorted(files, cameras);
@@ -89,7 +89,7 @@ impl Folder {
             .into_iter()
             .map(|file| file.path)
             .collect();
-        Err(foreign_file(&files).unwrap_or_else(|| {
+        Err(unsupported_file(&files).unwrap_or_else(|| {
             let nothing = FrameError::NoFrames { files: files.len() };
             nothing.in_file(directory)
         }))
@@ -105,7 +105,7 @@ impl Folder {
                 None => pictures.push(FolderImage::of(path)),
             }
         }
-        let rules = Rules::of(&pictures, cameras);
+        let rules = Rules::from_pictures(&pictures, cameras);
         let mut frames = Vec::new();
         for picture in pictures {
             match rules.kind(&picture) {
@@ -150,7 +150,7 @@ fn calibration(path: &Path) -> Option<OtherFile> {
     const KEYWORDS: [&[u8]; 3] = [b"IMAGETYP= '", b"FRAME   = '", b"OBSTYPE = '"];
     const KINDS: [&str; 4] = ["dark", "bias", "flat", "zero"];
     let head = head_of(path).ok()?;
-    if FrameFormat::of(&head) != Some(FrameFormat::Fits) {
+    if FrameFormat::detect(&head) != Some(FrameFormat::Fits) {
         return None;
     }
     let says = |keyword: &&[u8]| {
@@ -183,7 +183,8 @@ impl FolderImage {
     /// Whether its header can be read, as far as it is looked at here.
     fn is_whole(&self) -> bool {
         let is_fits = || {
-            head_of(&self.path).is_ok_and(|head| FrameFormat::of(&head) == Some(FrameFormat::Fits))
+            head_of(&self.path)
+                .is_ok_and(|head| FrameFormat::detect(&head) == Some(FrameFormat::Fits))
         };
         self.size.is_some() || is_fits()
     }
@@ -199,7 +200,7 @@ impl FolderImage {
 /// Width and height in the header of a file.
 fn size_of(path: &Path) -> Option<[u32; 2]> {
     let head = head_of(path).ok()?;
-    if FrameFormat::of(&head) == Some(FrameFormat::Fits) {
+    if FrameFormat::detect(&head) == Some(FrameFormat::Fits) {
         // The axes of a compressed image are those of its table.
         if memmem::find(&head, b"XTENSION=").is_some() {
             return None;
@@ -211,7 +212,7 @@ fn size_of(path: &Path) -> Option<[u32; 2]> {
         };
         return Some([axis(b"NAXIS1  = ")?, axis(b"NAXIS2  = ")?]);
     }
-    if FrameFormat::of(&head) == Some(FrameFormat::Tiff) {
+    if FrameFormat::detect(&head) == Some(FrameFormat::Tiff) {
         return caught(|| size_of_tiff(path)).ok().flatten();
     }
     let read = || {
@@ -227,7 +228,7 @@ fn size_of_tiff(path: &Path) -> Option<[u32; 2]> {
     const WIDTH: u16 = 256;
     const HEIGHT: u16 = 257;
     let bytes = files::read(path, MAX_FILE_BYTES).ok()?;
-    let first = TiffFile::of(&bytes).ok()?.directories().next()?.ok()?;
+    let first = TiffFile::parse(&bytes).ok()?.directories().next()?.ok()?;
     let side = |tag: u16| u32::try_from(first.first(tag, 0).ok()?).ok();
     Some([side(WIDTH)?, side(HEIGHT)?])
 }
@@ -261,7 +262,7 @@ struct Rules {
 }
 
 impl Rules {
-    fn of(pictures: &[FolderImage], cameras: Cameras) -> Self {
+    fn from_pictures(pictures: &[FolderImage], cameras: Cameras) -> Self {
         let plain = || pictures.iter().filter(|picture| picture.by_name.is_none());
         let mut counts: BTreeMap<[u32; 2], usize> = BTreeMap::new();
         let sizes = plain().filter_map(|picture| picture.size);
@@ -426,7 +427,7 @@ mod tests {
         }
 
         fn sorted(&self, cameras: Cameras) -> (Vec<String>, Vec<(String, &'static str)>) {
-            let folder = Folder::of(self.0.path(), cameras).unwrap();
+            let folder = Folder::read(self.0.path(), cameras).unwrap();
             let name = |path: &Path| {
                 let below = path.strip_prefix(self.0.path()).unwrap();
                 below.to_string_lossy().replace('\\', "/")

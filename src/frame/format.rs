@@ -46,7 +46,7 @@ impl FrameFormat {
     }
 
     /// The format whose signature `bytes` begin with.
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+    pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         const SIGNATURES: [(&[u8], FrameFormat); 8] = [
             (b"SIMPLE  =", FrameFormat::Fits),
             (b"II*\0", FrameFormat::Tiff),

@@ -1,6 +1,5 @@
 //! JPEG, decoded by `zune-jpeg`, which reads as it decodes and can be ended in between.
 
-use super::account::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
@@ -9,6 +8,7 @@ use super::jpeg_rows::check_rows;
 use super::jpeg_scans::{Scans, has_end};
 use super::levels::{LevelSamples, frame_from_integers};
 use super::raster::{damaged, unsupported};
+use super::read_budget::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use crate::base::size::Size;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
@@ -83,7 +83,7 @@ impl<'a> Jpeg<'a> {
                 Some(ColorSpace::Luma) => 1,
                 _ => 3,
             },
-            scans: Scans::of(bytes),
+            scans: Scans::parse(bytes),
             exif: decoder.exif().cloned(),
         })
     }

@@ -7,9 +7,9 @@
 //! # Reference
 //! ITU-T T.81 (1992), annexes B, C, F and G.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
+use super::read_budget::ReadBudget;
 
 /// Coefficients of a block.
 const BLOCK: usize = 64;
@@ -25,7 +25,7 @@ const MAX_CODE_BITS: u32 = 16;
 /// [`FrameError::Truncated`], [`FrameError::Interrupted`].
 pub(super) fn check_rows(bytes: &[u8], account: &ReadBudget) -> Result<(), FrameError> {
     let walk = Walk {
-        account: Some(account),
+        budget: Some(account),
         ..Walk::default()
     };
     let Some(missing) = walk.missing_rows(bytes) else {
@@ -51,7 +51,7 @@ struct MissingRows {
 /// What the segments before a scan say.
 #[derive(Default)]
 struct Walk<'a> {
-    account: Option<&'a ReadBudget>,
+    budget: Option<&'a ReadBudget>,
     is_progressive: bool,
     width: usize,
     height: usize,
@@ -248,7 +248,7 @@ impl Walk<'_> {
         let mut empty_blocks = 0;
         for unit in 0..units {
             let is_look = unit.is_multiple_of(UNITS_BETWEEN_CHECKS);
-            if is_look && self.account.is_some_and(|a| a.check_time().is_err()) {
+            if is_look && self.budget.is_some_and(|a| a.check_time().is_err()) {
                 return unit;
             }
             let is_restart =

@@ -24,7 +24,7 @@ pub(super) struct Scans {
 
 impl Scans {
     /// The scans of the image in `bytes`.
-    pub fn of(bytes: &[u8]) -> Self {
+    pub fn parse(bytes: &[u8]) -> Self {
         let (mut at, mut count, mut is_progressive) = (2, 0, false);
         while let Some((marker, end)) = next_marker(bytes, at) {
             match marker {
@@ -115,11 +115,11 @@ mod tests {
             .concat()
         };
         for scans in [0, 1, 3] {
-            assert_eq!(Scans::of(&file(scans)).count, scans);
+            assert_eq!(Scans::parse(&file(scans)).count, scans);
         }
         // Whatever is cut off, it ends.
         for end in 0..file(2).len() {
-            assert!(Scans::of(&file(2)[..end]).count <= 2);
+            assert!(Scans::parse(&file(2)[..end]).count <= 2);
         }
         let sizes = [(20_000, 10_000), (63_245, 63_245), (63_246, 63_246)];
         let one = Scans {

@@ -1,9 +1,9 @@
 //! From decoded samples to a frame: luminance, saturation and the step between grey levels.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::image::{Frame, check_length, check_size};
 use super::pixels::Pixels;
+use super::read_budget::ReadBudget;
 use crate::base::size::Size;
 use multiversion::multiversion;
 use std::ops::BitOr;

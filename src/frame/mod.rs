@@ -28,7 +28,6 @@
 //! Caveats: transparency is ignored. JPEG's gamma is not undone, so fluxes from JPEG are not
 //! linear. Integers and floats of more than 24 bits are rounded to 24.
 
-mod account;
 mod bayer_pattern;
 mod colors;
 mod columns;
@@ -38,7 +37,6 @@ mod error;
 mod exif;
 mod fits;
 mod folder;
-mod foreign;
 mod format;
 mod image;
 mod jpeg;
@@ -54,11 +52,13 @@ mod other_file;
 mod pages;
 mod pixels;
 mod raster;
+mod read_budget;
 mod reader;
 mod row_order;
 mod saturation;
+mod stored_rows;
 mod tiff;
-mod turning;
+mod unsupported_formats;
 
 pub use bayer_pattern::BayerPattern;
 pub use colors::Colors;

@@ -1,10 +1,10 @@
 //! All images of a file.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::FrameFormat;
 use super::image::Frame;
 use super::limits::MAX_PAGES;
+use super::read_budget::ReadBudget;
 use super::reader::{Buffers, decode_image, no_panic, read_limited};
 use super::{compressed, fits, tiff};
 use crate::base::files;
@@ -44,7 +44,7 @@ impl Pages {
     /// # Errors
     /// As [`Self::open`], without the path.
     pub fn read(stream: impl Read, buffers: &mut Buffers) -> Result<Self, FrameError> {
-        let account = buffers.account(0)?;
+        let account = buffers.budget(0)?;
         let mut bytes = Vec::new();
         read_limited(stream, 0, &account, &mut bytes)?;
         Self::unpacked(bytes, &account)
@@ -53,8 +53,8 @@ impl Pages {
     /// The images of the file whose content is `bytes`.
     /// # Errors
     /// As [`Self::open`], without the path.
-    pub fn of(bytes: Vec<u8>, buffers: &mut Buffers) -> Result<Self, FrameError> {
-        let account = buffers.account(bytes.capacity())?;
+    pub fn from_bytes(bytes: Vec<u8>, buffers: &mut Buffers) -> Result<Self, FrameError> {
+        let account = buffers.budget(bytes.capacity())?;
         Self::unpacked(bytes, &account)
     }
 
@@ -63,12 +63,12 @@ impl Pages {
     }
 
     fn counted(mut bytes: Vec<u8>, account: &ReadBudget) -> Result<Self, FrameError> {
-        if let Some(format) = FrameFormat::of(&bytes).filter(|format| format.is_compressed()) {
+        if let Some(format) = FrameFormat::detect(&bytes).filter(|format| format.is_compressed()) {
             let packed = std::mem::take(&mut bytes);
             bytes = compressed::unpack(&packed, format, account)?;
             account.release(packed.capacity() as u64);
         }
-        let format = FrameFormat::of(&bytes);
+        let format = FrameFormat::detect(&bytes);
         let (count, broken) = match format {
             Some(FrameFormat::Fits) => fits::count_pages(&bytes, account),
             Some(FrameFormat::Tiff) => tiff::count_pages(&bytes, account),
@@ -115,7 +115,7 @@ impl Pages {
         {
             return Err(error);
         }
-        let account = buffers.account(self.bytes.capacity())?;
+        let account = buffers.budget(self.bytes.capacity())?;
         let page = NonZeroUsize::new(self.next);
         let frame = no_panic(|| decode_image(&self.bytes, page, &account, Vec::new()));
         if self.next == self.count && frame.is_err() {
@@ -172,7 +172,7 @@ pub struct ImageName<'a> {
 
 impl<'a> ImageName<'a> {
     /// The only image of `path` that is meant.
-    pub const fn of(path: &'a Path) -> Self {
+    pub const fn new(path: &'a Path) -> Self {
         Self { path, page: None }
     }
 

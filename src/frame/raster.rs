@@ -1,11 +1,11 @@
 //! PNG, BMP and PNM, decoded by the `image` crate to 8 or 16 bits per sample.
 
-use super::account::{FLOATS_BYTES_PER_PIXEL, PIXELS_BETWEEN_CHECKS, ReadBudget};
 use super::error::FrameError;
 use super::exif;
 use super::format::FrameFormat;
 use super::image::{Frame, check_size};
 use super::levels::{LevelSamples, WholeNumber, frame_from_integers};
+use super::read_budget::{FLOATS_BYTES_PER_PIXEL, PIXELS_BETWEEN_CHECKS, ReadBudget};
 use crate::base::size::Size;
 use image::codecs::bmp::BmpDecoder;
 use image::codecs::png::PngDecoder;

@@ -1,13 +1,13 @@
 //! Reads files and streams, and decodes them by their format.
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::format::{FrameFormat, first_bytes};
 use super::image::Frame;
 use super::limits::{HEAD_BYTES, MAX_FILE_BYTES};
 use super::memory::MemoryLimit;
 use super::pixels::Pixels;
-use super::{compressed, fits, foreign, jpeg, raster, tiff};
+use super::read_budget::ReadBudget;
+use super::{compressed, fits, jpeg, raster, tiff, unsupported_formats};
 use crate::base::files;
 use crate::base::interrupt::Interrupt;
 use crate::base::panics::caught;
@@ -96,7 +96,7 @@ impl Buffers {
     }
 
     /// An account for one frame, whose file is in `bytes`.
-    pub(super) fn account(&mut self, bytes: usize) -> Result<ReadBudget, FrameError> {
+    pub(super) fn budget(&mut self, bytes: usize) -> Result<ReadBudget, FrameError> {
         self.beside_bytes = bytes as u64;
         let account = ReadBudget::new(self.memory, self.interrupt.clone());
         account.hold(self.beside_bytes)?;
@@ -166,7 +166,7 @@ fn read_expected(
     let mut pixels = std::mem::take(&mut buffers.pixels);
     bytes.clear();
     bytes.shrink_to(usize::try_from(expected).unwrap_or(usize::MAX));
-    let account = buffers.account(bytes.capacity())?;
+    let account = buffers.budget(bytes.capacity())?;
     if expected > account.left_bytes() / 2 {
         pixels = Vec::new();
     } else {
@@ -195,7 +195,7 @@ pub(super) fn read_limited(
         .take(HEAD_BYTES)
         .read_to_end(bytes)
         .map_err(|error| account.why(error.into()))?;
-    if FrameFormat::of(bytes).is_none() {
+    if FrameFormat::detect(bytes).is_none() {
         return Err(not_an_image(bytes));
     }
     let limit = MAX_FILE_BYTES;
@@ -216,7 +216,7 @@ fn not_an_image(bytes: &[u8]) -> FrameError {
     if bytes.is_empty() {
         return FrameError::Empty;
     }
-    if let Some(known) = foreign::of(bytes) {
+    if let Some(known) = unsupported_formats::detect(bytes) {
         return known.into();
     }
     FrameError::UnknownFormat {
@@ -257,7 +257,7 @@ pub fn decode_page_with(
     page: Option<NonZeroUsize>,
     buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
-    let account = buffers.account(bytes.len())?;
+    let account = buffers.budget(bytes.len())?;
     decode_with(bytes, page, &account, std::mem::take(&mut buffers.pixels))
 }
 
@@ -267,7 +267,7 @@ fn decode_with(
     account: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    no_panic(|| match FrameFormat::of(bytes) {
+    no_panic(|| match FrameFormat::detect(bytes) {
         Some(format) if format.is_compressed() => {
             let content = compressed::unpack(bytes, format, account)?;
             decode_image(&content, page, account, buffer)
@@ -293,14 +293,14 @@ pub(super) fn decode_image(
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
         _ => read(bytes, account),
     };
-    let format = FrameFormat::of(bytes);
+    let format = FrameFormat::detect(bytes);
     let buffer = match format {
         Some(FrameFormat::Tiff) => buffer,
         _ => Vec::new(),
     };
     match format {
         Some(FrameFormat::Fits) => fits::decode(bytes, page, account),
-        Some(FrameFormat::Tiff) => match foreign::raw_tiff(bytes) {
+        Some(FrameFormat::Tiff) => match unsupported_formats::raw_tiff(bytes) {
             Some(known) => Err(known.into()),
             None => tiff::decode(bytes, page, account, buffer),
         },

@@ -1,4 +1,4 @@
-use super::account::ReadBudget;
+use super::read_budget::ReadBudget;
 use super::reader::read_limited;
 use super::*;
 use crate::base::interrupt::Interrupt;

@@ -14,7 +14,7 @@ const PREDICTED_PER_OBSERVED: f64 = 1.5;
 const PREDICTED_EXTRA: usize = 5;
 /// Where the zero point is known, the prediction reaches the magnitude that this fraction of the
 /// observed stars exceed (a few outliers do not count), …
-const FAINT_SHARE: f64 = 0.95;
+const FAINT_FRACTION: f64 = 0.95;
 /// … and this much deeper, for colors and for luck at the threshold.
 const FAINT_ROOM_MAG: f64 = 1.5;
 
@@ -78,7 +78,7 @@ impl Hypothesis {
         predicted: &mut Vec<PredictedStar>,
     ) {
         let observed = &problem.field.stars;
-        let faint = (observed.len() as f64 * FAINT_SHARE) as usize;
+        let faint = (observed.len() as f64 * FAINT_FRACTION) as usize;
         let limit = observed.get(faint).map_or(f64::NEG_INFINITY, |star| {
             star.mag + self.zero_point_mag + FAINT_ROOM_MAG
         });

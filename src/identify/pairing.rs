@@ -135,7 +135,7 @@ impl Pairing {
                     self.of_predicted[near.index] += 1;
                 });
             let order = |pair: &NearPair| {
-                let strip = strips.of(predicted[pair.predicted].pixel.x);
+                let strip = strips.part_at(predicted[pair.predicted].pixel.x);
                 (strip, Reverse(pair.predicted))
             };
             self.candidates[first..].sort_unstable_by_key(order);

@@ -27,12 +27,12 @@ use std::sync::Arc;
 const CALIBRATION_STARS: [usize; 3] = [120, 30, 12];
 /// First pairing radius of the final fit, in units of the frame's diagonal, and the largest for few
 /// stars, …
-const FINAL_RADIUS_SHARE: f64 = 0.005;
-const MAX_RADIUS_SHARE: f64 = 0.0125;
+const FINAL_RADIUS_FRACTION: f64 = 0.005;
+const MAX_RADIUS_FRACTION: f64 = 0.0125;
 /// … which chance reaches for this share of the stars.
 const CHANCE_PAIRS: f64 = 0.02;
 /// A fit is good if it names this share of the stars that it began with.
-const GOOD_SHARE: f64 = 0.5;
+const GOOD_FRACTION: f64 = 0.5;
 
 /// A name is given where the odds that it is right are at least these, unless others are stated.
 pub const NAME_ODDS: f64 = 100.0;
@@ -269,7 +269,7 @@ impl Others {
             fields.map(move |field| FurtherSearch::new(of(field), SearchPlan::coarse(effort)))
         });
         let of_whole = coarser.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
-        let windows = self.windows.of(whole.field).iter().map(move |window| {
+        let windows = self.windows.cut(whole.field).iter().map(move |window| {
             let plan = if window.is_main {
                 SearchPlan::coarse(effort)
             } else {
@@ -396,7 +396,7 @@ impl<'w> PointedField<'w, '_> {
         } = self;
         let searched = search.problem();
         let problem = Problem {
-            field: bright.of(searched.field, found.stars),
+            field: bright.select(searched.field, found.stars),
             ..searched
         };
         let of_few = NamingStart {
@@ -423,7 +423,7 @@ impl<'w> PointedField<'w, '_> {
 struct Brightest(Option<StarField>);
 
 impl Brightest {
-    fn of(&mut self, field: &StarField, count: usize) -> &StarField {
+    fn select(&mut self, field: &StarField, count: usize) -> &StarField {
         let mut stars = self.0.take().map_or_else(Vec::new, |old| old.stars);
         stars.clear();
         stars.extend_from_slice(field.brightest(count));
@@ -467,7 +467,7 @@ fn with_names(
             continue;
         };
         let began_with = start.map_or(0, |stars| stars.min(problem.field.stars.len()));
-        let is_good = named.names as f64 >= GOOD_SHARE * began_with as f64;
+        let is_good = named.names as f64 >= GOOD_FRACTION * began_with as f64;
         if best.as_ref().is_none_or(|best| named.names > best.names) {
             search.keep_pairs();
             best = Some(named);
@@ -490,7 +490,7 @@ fn named_outwards(
     most_chance: f64,
 ) -> NamedFit {
     /// Largest distance of true pairs, in diagonals of the frame.
-    const RADIUS_SHARE: f64 = 0.002;
+    const RADIUS_FRACTION: f64 = 0.002;
     const MAX_ROUNDS: usize = 3;
     let field = problem.field;
     for _ in 0..MAX_ROUNDS {
@@ -499,7 +499,7 @@ fn named_outwards(
         let settled = followed.and_then(|hypothesis| {
             let start = Start {
                 hypothesis: &hypothesis,
-                radius_px: RADIUS_SHARE * libm::hypot(field.width_px, field.height_px),
+                radius_px: RADIUS_FRACTION * libm::hypot(field.width_px, field.height_px),
                 sceptical: false,
                 stars: hypothesis.fitted_stars,
                 richest: DistortionModel::Irregular5,
@@ -540,8 +540,8 @@ fn settle(
     let start = Start {
         hypothesis: &hypothesis,
         radius_px: by_chance_px.clamp(
-            FINAL_RADIUS_SHARE * diagonal_px,
-            MAX_RADIUS_SHARE * diagonal_px,
+            FINAL_RADIUS_FRACTION * diagonal_px,
+            MAX_RADIUS_FRACTION * diagonal_px,
         ),
         sceptical: false,
         stars,

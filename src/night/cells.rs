@@ -44,7 +44,7 @@ impl From<Hundredths> for Option<f64> {
 
 impl NightCells {
     /// Those of a sky that is divided by altitude and azimuth, else `None`.
-    pub(super) fn of(sky: &SkyMap) -> Option<Self> {
+    pub(super) fn from_sky(sky: &SkyMap) -> Option<Self> {
         let mut cells = sky.cells.iter().peekable();
         // Both are in the same order.
         let at_places: Vec<Option<&SkyCell>> = horizon_places()

@@ -14,11 +14,11 @@ pub struct FrameLevel {
 
 impl FrameLevel {
     /// That of a frame whose date and exposure are known, and whose background is well below saturation.
-    pub fn of(frame: &Frame) -> Option<Self> {
+    pub fn measure(frame: &Frame) -> Option<Self> {
         /// Pixels that are looked at, about.
         const SAMPLES: usize = 20_000;
         /// Largest level over that of saturation.
-        const MOST: f64 = 0.8;
+        const MAX: f64 = 0.8;
         let step = (frame.size().pixels() / SAMPLES).max(1) | 1;
         let values = frame.pixels.values().step_by(step).map(f64::from);
         let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
@@ -30,7 +30,7 @@ impl FrameLevel {
         let full_adu = frame
             .saturation_level_adu()
             .map_or(f64::INFINITY, f64::from);
-        (found.level_adu < MOST * full_adu).then_some(found)
+        (found.level_adu < MAX * full_adu).then_some(found)
     }
 }
 
@@ -64,16 +64,16 @@ pub fn dark_level(levels: &[FrameLevel]) -> Option<DarkLevel> {
 
 /// The level without light by two neighbors, and the light in the shorter exposure.
 fn level_of_pair(first: FrameLevel, second: FrameLevel) -> Option<(f64, f64)> {
-    const LEAST_RATIO: f64 = 1.5;
+    const MIN_RATIO: f64 = 1.5;
     /// Time between them at most, in days.
-    const MOST_D: f64 = 10.0 / 1440.0;
+    const MAX_D: f64 = 10.0 / 1440.0;
     let (short, long) = if first.exposure_s < second.exposure_s {
         (first, second)
     } else {
         (second, first)
     };
-    let is_near = (second.mjd - first.mjd).abs() < MOST_D;
-    if !is_near || long.exposure_s < LEAST_RATIO * short.exposure_s {
+    let is_near = (second.mjd - first.mjd).abs() < MAX_D;
+    if !is_near || long.exposure_s < MIN_RATIO * short.exposure_s {
         return None;
     }
     let per_s = (long.level_adu - short.level_adu) / (long.exposure_s - short.exposure_s);

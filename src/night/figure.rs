@@ -120,10 +120,10 @@ impl TimeAxis {
 
     /// Full hours, not too close.
     fn hours(&self) -> impl Iterator<Item = u32> + use<> {
-        const MOST: f64 = 14.0;
+        const MAX: f64 = 14.0;
         let (first, last) = (24.0 * self.first, 24.0 * self.last);
         let step = [1.0, 2.0, 3.0, 6.0, 12.0, 24.0, 168.0];
-        let step = step.into_iter().find(|step| (last - first) / step < MOST);
+        let step = step.into_iter().find(|step| (last - first) / step < MAX);
         let step = step.unwrap_or(720.0);
         let start = (first / step).ceil();
         let count = ((last / step).floor() - start + 1.0).max(0.0) as u32;
@@ -235,7 +235,7 @@ impl Plot {
     /// The bounds of what is shown, with some room.
     fn range(&self, rows: &[NightRow]) -> [f64; 2] {
         /// Least range, in the units of the values.
-        const LEAST: f64 = 0.2;
+        const MIN: f64 = 0.2;
         if let Some(bounds) = self.bounds {
             return bounds;
         }
@@ -246,7 +246,7 @@ impl Plot {
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
             [low.min(value), high.max(value)]
         });
-        let room = 0.08 * (high - low).max(LEAST);
+        let room = 0.08 * (high - low).max(MIN);
         [low - room, high + room]
     }
 
@@ -296,8 +296,8 @@ impl Plot {
 /// Round values between bounds, and the decimals that they need.
 fn ticks([low, high]: [f64; 2]) -> (Vec<f64>, usize) {
     /// Ticks at most.
-    const MOST: f64 = 5.0;
-    let least = (high - low) / MOST;
+    const MAX: f64 = 5.0;
+    let least = (high - low) / MAX;
     let exponent = libm::floor(libm::log10(least));
     let power = libm::pow(10.0, exponent);
     let step = [1.0, 2.0, 5.0].into_iter().map(|part| part * power);

@@ -25,7 +25,7 @@ use std::f64::consts::TAU;
 /// Standard deviations by which a pixel stands out.
 const SIGMAS: f32 = 10.0;
 /// Share of the frames in which a hot pixel stands out.
-const SHARE: f64 = 0.75;
+const FRACTION: f64 = 0.75;
 /// Frames that are needed.
 const MIN_FRAMES: usize = 6;
 /// The least motion of the sky, in pixels.
@@ -134,7 +134,7 @@ pub fn hot_pixels(
         };
         let place = PixelPoint::new(x as f64, drawn_y as f64);
         let moves = motion.as_ref().is_none_or(|motion| motion.moves(&place));
-        (share >= SHARE && moves).then(|| NightHotPixel {
+        (share >= FRACTION && moves).then(|| NightHotPixel {
             x,
             y,
             share: to_decimals(share, 3),

@@ -19,8 +19,8 @@
 
 mod almanac;
 mod cells;
+mod change_detection;
 mod dark_level;
-mod departure;
 mod figure;
 mod hot_pixels;
 mod moments;

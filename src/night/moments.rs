@@ -2,7 +2,7 @@
 
 use super::almanac::Almanac;
 use super::cells::{NightCells, middles_deg};
-use super::departure::{DetectedChange, departures};
+use super::change_detection::{DetectedChange, find_changes};
 use super::pointing::PointingJump;
 use super::row::NightRow;
 use crate::base::epoch::ObservationDate;
@@ -13,11 +13,11 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Least change of the share of the sky that is behind clouds,
-const LEAST_CLOUDS: f64 = 0.1;
+const MIN_CLOUDS: f64 = 0.1;
 /// of the spot, as a part of it,
-const LEAST_WIDENING: f64 = 0.05;
+const MIN_WIDENING: f64 = 0.05;
 /// and of the stars' brightness, in magnitudes.
-const LEAST_DIMMING_MAG: f64 = 0.1;
+const MIN_DIMMING_MAG: f64 = 0.1;
 
 /// Frames in which clouds come, or go,
 const BEGINNING: usize = 2;
@@ -158,7 +158,7 @@ impl<'a> DatedRows<'a> {
         let shares: Vec<Option<f64>> = self.rows.iter().map(|row| row.cloud_share).collect();
         let known = |at: &usize| self.rows[*at].cells.is_some();
         let mut moments = Vec::new();
-        for DetectedChange { start, end } in departures(&shares, LEAST_CLOUDS) {
+        for DetectedChange { start, end } in find_changes(&shares, MIN_CLOUDS) {
             let clear = (0..start).rev().filter(known).take(COMPARED);
             let cloudy = (start..self.rows.len()).filter(known).take(BEGINNING);
             let come = self.at(MomentKind::CloudsCome, start).map(|moment| Moment {
@@ -231,8 +231,8 @@ impl<'a> DatedRows<'a> {
             self.rows.iter().map(told).collect()
         };
         let widths = of(|row| row.spot_sigma_px.filter(|px| *px > 0.0).map(libm::log));
-        let wider = departures(&widths, LEAST_WIDENING);
-        let dimmer = departures(&of(|row| row.dimming_mag), LEAST_DIMMING_MAG);
+        let wider = find_changes(&widths, MIN_WIDENING);
+        let dimmer = find_changes(&of(|row| row.dimming_mag), MIN_DIMMING_MAG);
         let meets = |a: &DetectedChange, b: &DetectedChange| {
             let last = |departure: &DetectedChange| departure.end.unwrap_or(self.rows.len());
             a.start < last(b) && b.start < last(a)

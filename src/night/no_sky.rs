@@ -49,7 +49,7 @@ impl NoSky {
     }
 
     /// What the solved frame in the file `name` is; `None` if it shows the sky of the night, or may.
-    pub fn of(name: &Path, solution: &Solution, frame: &Frame) -> Option<Self> {
+    pub fn detect(name: &Path, solution: &Solution, frame: &Frame) -> Option<Self> {
         if matches!(solution.outcome, Outcome::Identified(_)) {
             return None;
         }
@@ -67,12 +67,12 @@ impl NoSky {
 /// Whether a bright frame without stars is of the day.
 fn shows_day(name: &Path, solution: &Solution, frame: &Frame, light: &LightStatistics) -> bool {
     /// Share of saturated pixels that no sky of the night reaches.
-    const MOST_SATURATED: f64 = 0.3;
+    const MAX_SATURATED: f64 = 0.3;
     /// No sky of the night is bright in so short an exposure, in seconds.
     const SHORT_S: f64 = 0.1;
     /// Hours that are of the day wherever local time is told.
     const HOURS: std::ops::Range<u32> = 10..15;
-    if light.saturated > MOST_SATURATED
+    if light.saturated > MAX_SATURATED
         || frame
             .metadata
             .exposure_s
@@ -155,22 +155,22 @@ impl LightStatistics {
 
     /// A level below which a pixel sees no sky, where a part of the frame is darker than the rest.
     fn unlit_adu(&self) -> f64 {
-        const SHARE: f64 = 0.3;
+        const FRACTION: f64 = 0.3;
         const SIGMAS: f64 = 5.0;
-        self.least + SHARE * (self.median - self.least) - SIGMAS * self.noise
+        self.least + FRACTION * (self.median - self.least) - SIGMAS * self.noise
     }
 
     /// Whether it is as bright as exposures by day are.
     fn is_bright(&self) -> bool {
-        const SHARE: f64 = 0.25;
-        self.full.is_some_and(|full| self.median > SHARE * full)
+        const FRACTION: f64 = 0.25;
+        self.full.is_some_and(|full| self.median > FRACTION * full)
     }
 
     /// Whether it is dark, and as dark everywhere: there is no sky, no horizon, and no edge of a lens's circle.
     fn is_even(&self) -> bool {
         const OF_NOISE: f64 = 0.2;
-        const SHARE: f64 = 0.1;
-        self.full.is_some_and(|full| self.median < SHARE * full)
+        const FRACTION: f64 = 0.1;
+        self.full.is_some_and(|full| self.median < FRACTION * full)
             && self.range <= (OF_NOISE * self.noise).max(self.step)
     }
 }
@@ -205,7 +205,7 @@ fn is_trailed(frame: &Frame, light: &LightStatistics) -> bool {
     const AROUND: usize = 7;
     const COHERENT: f64 = 0.7;
     const MIN_LINES: usize = 50;
-    const SHARE: f64 = 0.6;
+    const FRACTION: f64 = 0.6;
     let limit = (SIGMAS * light.noise.max(0.5 * light.step)) as f32;
     let unlit = light.unlit_adu();
     let (mut lines, mut all) = (0, 0);
@@ -226,7 +226,7 @@ fn is_trailed(frame: &Frame, light: &LightStatistics) -> bool {
             }
         }
     }
-    lines >= MIN_LINES && lines as f64 > SHARE * f64::from(all)
+    lines >= MIN_LINES && lines as f64 > FRACTION * f64::from(all)
 }
 
 /// How far from the rim of the lens's circle lines count, in pixels.

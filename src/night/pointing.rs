@@ -15,7 +15,7 @@ const CONFIRMED: usize = 3;
 /// Pointings that differ by more than these standard errors do not agree,
 const SIGMAS: f64 = 6.0;
 /// and by more than this: neglected effects, and lenses that are not quite known.
-const LEAST_RAD: f64 = 120.0 * RAD_PER_ARCSEC;
+const MIN_RAD: f64 = 120.0 * RAD_PER_ARCSEC;
 
 /// A moment at which the camera was moved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,34 +38,34 @@ struct Pointed {
 /// The pointing that is held, from frame to frame. It depends on the frames so far and nothing else.
 #[derive(Debug, Clone, Default)]
 pub struct PointingHistory {
-    held: Option<Rotation<Horizon, Camera>>,
+    fixed: Option<Rotation<Horizon, Camera>>,
     /// Those of the last frames that agree.
     recent: VecDeque<Pointed>,
     /// The last frames that do not agree with what is held.
     suspects: Vec<Pointed>,
-    knocks: Vec<PointingJump>,
+    jumps: Vec<PointingJump>,
 }
 
 impl PointingHistory {
     /// Starts with this pointing, if one is known.
     pub fn new(held: Option<Rotation<Horizon, Camera>>) -> Self {
         Self {
-            held,
+            fixed: held,
             ..Self::default()
         }
     }
 
     /// The pointing that is held, and its standard error about each axis in radians; `None` as long as frames
     /// contradict it and none agrees with it, as those of a camera that follows the stars.
-    pub fn held(&self) -> Option<(Rotation<Horizon, Camera>, f64)> {
+    pub fn fixed(&self) -> Option<(Rotation<Horizon, Camera>, f64)> {
         let is_contradicted = self.recent.is_empty() && !self.suspects.is_empty();
-        let held = self.held.filter(|_| !is_contradicted)?;
+        let held = self.fixed.filter(|_| !is_contradicted)?;
         Some((held, self.scatter_rad()))
     }
 
     /// When the camera was moved.
-    pub fn knocks(&self) -> &[PointingJump] {
-        &self.knocks
+    pub fn jumps(&self) -> &[PointingJump] {
+        &self.jumps
     }
 
     /// Takes the pointing of frame number `frame` with its standard error, and returns by how much it
@@ -81,7 +81,7 @@ impl PointingHistory {
             pointing,
             sigma_rad,
         };
-        let held = *self.held.get_or_insert(pointing);
+        let held = *self.fixed.get_or_insert(pointing);
         let shift_rad = held.angle_to(&pointing);
         if shift_rad < self.limit_rad(sigma_rad) {
             self.suspects.clear();
@@ -89,7 +89,7 @@ impl PointingHistory {
             if self.recent.len() > RECENT {
                 self.recent.pop_front();
             }
-            self.held = Some(self.middle(held));
+            self.fixed = Some(self.middle(held));
         } else {
             self.suspect(now, held);
         }
@@ -103,7 +103,7 @@ impl PointingHistory {
     }
 
     fn limit_rad(&self, sigma_rad: f64) -> f64 {
-        (SIGMAS * libm::hypot(self.scatter_rad(), sigma_rad)).max(LEAST_RAD)
+        (SIGMAS * libm::hypot(self.scatter_rad(), sigma_rad)).max(MIN_RAD)
     }
 
     /// Counts a frame that does not agree with `held`.
@@ -117,13 +117,13 @@ impl PointingHistory {
         }
         // Without a pointing that was confirmed there is none that was left.
         if !self.recent.is_empty() {
-            self.knocks.push(PointingJump {
+            self.jumps.push(PointingJump {
                 frame: self.suspects[0].frame,
                 shift_deg: held.angle_to(&now.pointing) * DEG_PER_RAD,
             });
         }
         self.recent = self.suspects.drain(..).collect();
-        self.held = Some(self.middle(now.pointing));
+        self.fixed = Some(self.middle(now.pointing));
     }
 
     /// The median of the recent pointings, as turns from `from`.
@@ -146,7 +146,7 @@ impl PointingHistory {
         const MEDIAN: f64 = 1.538;
         let stated = self.recent.iter().map(|pointed| pointed.sigma_rad);
         let stated_rad = stated.fold(0.0, f64::max);
-        let Some(held) = self.held.filter(|_| self.recent.len() >= CONFIRMED) else {
+        let Some(held) = self.fixed.filter(|_| self.recent.len() >= CONFIRMED) else {
             return stated_rad;
         };
         let mut off: Vec<f64> = self.turns(held).map(|turn| turn.norm()).collect();
@@ -181,12 +181,12 @@ mod tests {
     #[test]
     fn a_knock_is_the_first_of_three_frames_that_agree_elsewhere() {
         let history = after(&[0.0, 0.001, -0.001, 0.0, 1.5, 1.5, 1.501]);
-        let [knock] = history.knocks() else {
+        let [knock] = history.jumps() else {
             panic!("{history:?}");
         };
         assert_eq!(knock.frame, 4);
         assert!((knock.shift_deg - 1.5).abs() < 0.01);
-        let (held, _) = history.held().unwrap();
+        let (held, _) = history.fixed().unwrap();
         assert!(held.angle_to(&turned(1.5)) < 1e-4);
     }
 
@@ -194,20 +194,20 @@ mod tests {
     fn a_single_frame_elsewhere_and_a_camera_that_turns_are_no_knocks() {
         assert!(
             after(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0])
-                .knocks()
+                .jumps()
                 .is_empty()
         );
         let turning: Vec<f64> = (0..30).map(f64::from).collect();
         let turning = after(&turning[1..]);
-        assert!(turning.knocks().is_empty() && turning.held().is_none());
+        assert!(turning.jumps().is_empty() && turning.fixed().is_none());
     }
 
     #[test]
     fn a_slow_drift_is_followed() {
         let drifting: Vec<f64> = (0..200).map(|frame| 0.002 * f64::from(frame)).collect();
         let history = after(&drifting);
-        assert!(history.knocks().is_empty());
-        assert!(history.held().unwrap().0.angle_to(&turned(0.4)) < 0.02 * RAD_PER_DEG);
+        assert!(history.jumps().is_empty());
+        assert!(history.fixed().unwrap().0.angle_to(&turned(0.4)) < 0.02 * RAD_PER_DEG);
     }
 
     #[test]

@@ -125,7 +125,7 @@ impl NightRow {
 
     /// The row of a frame that was read. `clear_ground_vmag` is the zero point through one airmass of the
     /// clearest frame of the start.
-    pub fn of(frame: &str, solution: &Solution, clear_ground_vmag: Option<f64>) -> Self {
+    pub fn from_solution(frame: &str, solution: &Solution, clear_ground_vmag: Option<f64>) -> Self {
         let mut row = Self {
             frame: frame.to_owned(),
             status: IDENTIFIED.to_owned(),
@@ -274,7 +274,7 @@ impl NightRow {
             self.zenith_sigma_mag = mag(zenith.light.mag_arcsec2.sigma);
             self.naked_eye_limit_vmag = finite(zenith.naked_eye_limit_vmag, 2);
         }
-        self.cells = NightCells::of(sky);
+        self.cells = NightCells::from_sky(sky);
         let share = sky.cloud_share.as_ref();
         let of_share =
             |value: fn(&Estimate) -> f64| share.and_then(|share| finite(value(share), 4));

@@ -39,7 +39,7 @@ pub struct Probe {
 
 impl Probe {
     /// That of a solved frame; `None` if its stars are not identified.
-    pub fn of(name: &str, solution: &Solution) -> Option<Self> {
+    pub fn from_solution(name: &str, solution: &Solution) -> Option<Self> {
         let Outcome::Identified(found) = &solution.outcome else {
             return None;
         };
@@ -85,7 +85,7 @@ pub struct NightStart {
     /// The lens.
     pub lens: Option<Arc<KnownLens>>,
     /// How the camera stands, and its clear sky.
-    pub held: Option<FixedCamera>,
+    pub fixed_camera: Option<FixedCamera>,
     /// Zero point through one airmass in the clearest of the frames whose exposure is known, in V.
     pub clear_ground_vmag: Option<f64>,
     /// Whether frames do not tell the level of a pixel without light.
@@ -100,7 +100,7 @@ pub struct NightStart {
 
 impl NightStart {
     /// What `probes` tell; `known` is the lens that was measured before.
-    pub fn of(probes: Vec<Probe>, known: Option<Arc<KnownLens>>) -> Self {
+    pub fn from_probes(probes: Vec<Probe>, known: Option<Arc<KnownLens>>) -> Self {
         let clearest = |is: fn(&&Probe) -> bool| {
             let skies = probes.iter().filter(is).filter_map(|probe| probe.clear_sky);
             skies.max_by(|a, b| a.ground_vmag().total_cmp(&b.ground_vmag()))
@@ -137,7 +137,7 @@ impl NightStart {
         Self {
             lens,
             lacks_dark_level: lacks_dark_level && held.is_some(),
-            held,
+            fixed_camera: held,
             clear_ground_vmag: exposed_sky.map(|sky| sky.ground_vmag()),
             site,
             ahead,
@@ -149,7 +149,7 @@ impl NightStart {
     #[must_use]
     pub fn with_dark_level(self, dark: Option<DarkLevel>) -> Self {
         Self {
-            held: self.held.map(|held| FixedCamera { dark, ..held }),
+            fixed_camera: self.fixed_camera.map(|held| FixedCamera { dark, ..held }),
             ..self
         }
     }

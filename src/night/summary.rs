@@ -9,7 +9,7 @@ use crate::ephemeris::observer::Site;
 use serde::Serialize;
 
 /// A night is clear where less of the sky is behind clouds,
-const CLEAR_SHARE: f64 = 0.2;
+const CLEAR_FRACTION: f64 = 0.2;
 /// and its stars lost less light than this all over the sky, in magnitudes.
 const CLEAR_DIMMING_MAG: f64 = 0.3;
 /// Frames further apart do not stand for the time between them, in days.
@@ -138,7 +138,7 @@ pub fn summarize(rows: &[NightRow], site: Option<Site>, knocks: &[PointingJump])
 }
 
 fn is_clear(row: &NightRow) -> bool {
-    row.cloud_share.is_some_and(|share| share < CLEAR_SHARE)
+    row.cloud_share.is_some_and(|share| share < CLEAR_FRACTION)
         && row.dimming_mag.is_none_or(|mag| mag < CLEAR_DIMMING_MAG)
 }
 

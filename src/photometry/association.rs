@@ -79,7 +79,7 @@ struct FaintLight {
 
 impl FaintLight {
     /// Of the stars `predicted`, brightest first, where `detections` has none of them.
-    fn of(
+    fn new(
         predicted: &[PredictedStar],
         detections: &[Option<usize>],
         width_px: f64,
@@ -111,13 +111,13 @@ impl FaintLight {
     /// Its mean around `star`, over the star's own light.
     fn over_light_of(&self, star: &PredictedStar) -> f64 {
         /// Beside more of it no star is measured.
-        const MOST: f64 = 0.5;
+        const MAX: f64 = 0.5;
         let mut light = 0.0;
         self.places
             .for_each_within(&star.pixel, self.reach_px, |near| {
                 light += self.light[near.index];
             });
-        (light * self.response / light_of(star.v_mag)).min(MOST)
+        (light * self.response / light_of(star.v_mag)).min(MAX)
     }
 }
 
@@ -129,7 +129,7 @@ pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
     let spot_sigma_px = frame.detections.spot_sigma_px;
     let resolved_px = resolved_px(spot_sigma_px);
     let width_px = (spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
-    let faint_light = FaintLight::of(predicted, &detections, width_px, resolved_px);
+    let faint_light = FaintLight::new(predicted, &detections, width_px, resolved_px);
     let surroundings = |index: usize, star: &PredictedStar| {
         let mut around = Crowding {
             is_single: true,

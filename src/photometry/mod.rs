@@ -76,7 +76,7 @@ pub(crate) fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePho
         completeness::measure(&counted.collect::<Vec<_>>(), chance)
     };
     let by_v = counted(&|star| star.v_mag);
-    let standards = Standards::of(&clear, frame, sky);
+    let standards = Standards::select(&clear, frame, sky);
     let chosen = standards.chosen(by_v.fall.as_ref());
     let mut zero_point = zero_point::measure(&chosen);
     if let Some(zero_point) = &mut zero_point {

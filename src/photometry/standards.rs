@@ -21,7 +21,7 @@ pub(super) struct Standards {
 
 impl Standards {
     /// Of the stars `clear` of a frame.
-    pub fn of(clear: &[&FrameStar], frame: &IdentifiedFrame, sky: &IndexedCatalog) -> Self {
+    pub fn select(clear: &[&FrameStar], frame: &IdentifiedFrame, sky: &IndexedCatalog) -> Self {
         let detection =
             |star: &&FrameStar| Some((**star, &frame.detections.sources[star.detection?]));
         let detected = clear

@@ -17,7 +17,7 @@ const BRIGHT_DETECTIONS: usize = 10;
 const BORDER_SIGMAS: f64 = 6.0;
 const BORDER_PX: f64 = 5.0;
 /// A detection within this fraction of the frame's diagonal may be the star.
-const NEAR_SHARE: f64 = 0.01;
+const NEAR_FRACTION: f64 = 0.01;
 
 /// A bright catalogue star in the frame that no detection has the name of.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,7 +90,7 @@ impl NamedFrame<'_> {
     fn missing(&self, star: &PredictedStar) -> MissingStar {
         let catalog = self.indexed.catalog();
         let camera = &self.identification.camera;
-        let reach_px = NEAR_SHARE * libm::hypot(camera.width_px, camera.height_px);
+        let reach_px = NEAR_FRACTION * libm::hypot(camera.width_px, camera.height_px);
         let distance_px = |detection: &Detection| detection.position.distance_to(&star.pixel);
         // The brightest comes first.
         let nearby = self.detections.sources.iter();

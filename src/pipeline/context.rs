@@ -1,6 +1,6 @@
 //! What the stages need and what does not change from frame to frame.
 
-use super::held::FixedCamera;
+use super::fixed_camera::FixedCamera;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
 use crate::base::interrupt::Interrupt;
@@ -41,7 +41,7 @@ pub struct Context<'a> {
     /// What local times in names of files and in Exif are ahead of UTC, where it is known.
     pub utc_offset: Option<UtcOffset>,
     /// How the camera stands, where it does not move: tried first.
-    pub held: Option<Arc<FixedCamera>>,
+    pub fixed_camera: Option<Arc<FixedCamera>>,
     /// The calibration of frames that are read from files.
     pub calibration: Option<&'a Calibration>,
     /// Whether to stop at attitude and optics, from the brightest stars: no other star is named, and
@@ -80,7 +80,7 @@ impl<'a> Context<'a> {
             lens: None,
             frame_sizes: Vec::new(),
             utc_offset: None,
-            held: None,
+            fixed_camera: None,
             calibration: None,
             attitude_only: false,
             measure_sky: false,

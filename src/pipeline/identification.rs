@@ -120,7 +120,7 @@ impl SecondImages {
     /// the images, or lies between them, and its error gets half of the way from one to the other.
     ///
     /// They are not looked for where attitude and optics alone are wanted.
-    pub fn of(
+    pub fn find(
         outcome: &mut Outcome,
         attitude_only: bool,
         field: impl FnOnce() -> StarField,

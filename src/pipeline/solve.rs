@@ -227,7 +227,7 @@ fn solve(
     } = stars;
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
-    let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
+    let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
         star_field(frame, &detections, places)
     });
     clock.lap(Stage::Identify);
@@ -354,7 +354,7 @@ impl StarSearch<'_, '_> {
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
         let mut identify = |places| {
-            let held = context.held.as_ref();
+            let held = context.fixed_camera.as_ref();
             let near = held.and_then(|held| held.near(priors, &places));
             let mut outcome = None;
             for priors in near.iter().chain([priors]) {
@@ -385,7 +385,10 @@ impl StarSearch<'_, '_> {
             through_air_or_not(places, &mut identify)
         });
         if outcome.identification().is_none()
-            && let Some(spot_sigma_px) = context.held.as_ref().and_then(|held| held.spot_sigma_px)
+            && let Some(spot_sigma_px) = context
+                .fixed_camera
+                .as_ref()
+                .and_then(|held| held.spot_sigma_px)
         {
             // Behind clouds, what was measured as the size of stars may be that of clouds.
             let config = DetectConfig {

@@ -77,7 +77,7 @@ pub fn solve_centroids(
     let mut clock = Stopwatch::start(context.on_stage);
     workspace.set_deadline(clock.deadline(context.time_limit));
     let (list, left_out) = list.usable();
-    let frame = ListFrame::of(&list, &context.camera_sizes())?;
+    let frame = ListFrame::from_list(&list, &context.camera_sizes())?;
     let [width, height] = frame.size.sides();
     let priors = &priors_of(frame.size, context);
     let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
@@ -99,7 +99,7 @@ pub fn solve_centroids(
         through_air_or_not(places, &mut identify)
     });
     let priors = &priors;
-    let second_images = SecondImages::of(&mut outcome, context.attitude_only, || {
+    let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
         list.star_field_in(frame.size, priors.places())
     });
     if let Outcome::Identified(found) = &mut outcome {

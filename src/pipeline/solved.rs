@@ -78,7 +78,7 @@ impl SolvedFrame<'_> {
     ) {
         let held = match self.outcome {
             Outcome::Identified(_) => None,
-            Outcome::NotIdentified(_) => self.as_held(),
+            Outcome::NotIdentified(_) => self.as_fixed(),
         };
         let Some(identification) = self.outcome.identification().or(held.as_ref()) else {
             return;
@@ -96,7 +96,7 @@ impl SolvedFrame<'_> {
         // A flat divides pixels without light by what is no light.
         let by_frame = self.frame.metadata.dark_level_adu.filter(|_| !has_flat);
         let by_frame = by_frame.map(|adu| DarkLevel::stated(adu, DarkSource::OpticalBlack));
-        let usual = self.context.held.as_ref();
+        let usual = self.context.fixed_camera.as_ref();
         let picture = SkyPicture {
             frame: self.frame,
             flux_scale: self.mosaic.map_or(1.0, |mosaic| mosaic.flux_scale()),
@@ -136,9 +136,9 @@ impl SolvedFrame<'_> {
         found.is_some_and(|found| found.places.zenith().is_some() && sky::is_wide(&found.camera))
     }
 
-    fn as_held(&self) -> Option<Identification> {
+    fn as_fixed(&self) -> Option<Identification> {
         let size_px = [self.frame.width as f64, self.frame.height as f64];
-        let held = self.context.held.as_ref()?;
+        let held = self.context.fixed_camera.as_ref()?;
         let places = self.priors.places();
         held.identification(&self.detections, places, self.context.indexed, size_px)
     }

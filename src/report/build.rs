@@ -1,8 +1,8 @@
 //! Makes a report of a solution.
 
 use super::digits::{
-    AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, HORIZON_DECIMALS, MAG_DECIMALS,
-    PIXEL_DECIMALS, SHARE_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
+    AIRMASS_DECIMALS, DIRECTION_DECIMALS, FLUX_DIGITS, FRACTION_DECIMALS, HORIZON_DECIMALS,
+    MAG_DECIMALS, PIXEL_DECIMALS, SIGMA_DIGITS, YEAR_DECIMALS,
 };
 use super::frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, CalibrationReport,
@@ -370,7 +370,7 @@ fn background(measured: Option<&Background>) -> BackgroundReport {
     BackgroundReport {
         level: measured.and_then(|sky| significant(sky.level_adu, FLUX_DIGITS)),
         noise: measured.and_then(|sky| significant(sky.noise_adu, FLUX_DIGITS)),
-        sky_share: measured.map(|sky| to_decimals(sky.sky_share, SHARE_DECIMALS)),
+        sky_share: measured.map(|sky| to_decimals(sky.sky_share, FRACTION_DECIMALS)),
     }
 }
 

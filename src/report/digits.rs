@@ -19,4 +19,4 @@ pub(super) const CHANCE_DIGITS: i32 = 2;
 /// Significant digits of a standard error.
 pub(super) const SIGMA_DIGITS: i32 = 4;
 /// Decimals of a share of the frame.
-pub(super) const SHARE_DECIMALS: i32 = 4;
+pub(super) const FRACTION_DECIMALS: i32 = 4;

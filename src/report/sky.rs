@@ -1,6 +1,6 @@
 //! The sky at each place of a frame, in reports.
 
-use super::digits::{HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS, SHARE_DECIMALS};
+use super::digits::{FRACTION_DECIMALS, HORIZON_DECIMALS, MAG_DECIMALS, PIXEL_DECIMALS};
 use crate::base::format::{significant, to_decimals};
 use crate::base::statistics::Estimate;
 use crate::sky::{Place, SkyCell, SkyMap, ToneFit, ZenithSky};
@@ -149,7 +149,7 @@ impl SkyReport {
         let has_horizon = clear.has_horizon;
         let share = |value: fn(&Estimate) -> f64| {
             let share = sky.cloud_share.as_ref();
-            share.map(|share| to_decimals(value(share), SHARE_DECIMALS))
+            share.map(|share| to_decimals(value(share), FRACTION_DECIMALS))
         };
         Self {
             zero_point_vmag: mag(clear.zero_point_vmag.value),
@@ -182,7 +182,7 @@ impl ToneCurveReport {
     fn new(tone: &ToneFit) -> Self {
         Self {
             kind: tone.kind.code(),
-            probability: to_decimals(tone.probability, SHARE_DECIMALS),
+            probability: to_decimals(tone.probability, FRACTION_DECIMALS),
             exponent: to_decimals(tone.exponent.value, EXPONENT_DECIMALS),
             exponent_sigma: to_decimals(tone.exponent.sigma, EXPONENT_DECIMALS),
         }
@@ -233,13 +233,15 @@ impl SkyCellReport {
             detected: cell.detected,
             extinction_mag: extinction.map(|extinction| mag(extinction.value)),
             extinction_sigma_mag: extinction.map(|extinction| mag(extinction.sigma)),
-            clear: cell.clear.map(|clear| to_decimals(clear, SHARE_DECIMALS)),
+            clear: cell
+                .clear
+                .map(|clear| to_decimals(clear, FRACTION_DECIMALS)),
             clear_low: cell
                 .clear_band
-                .map(|[low, _]| to_decimals(low, SHARE_DECIMALS)),
+                .map(|[low, _]| to_decimals(low, FRACTION_DECIMALS)),
             clear_high: cell
                 .clear_band
-                .map(|[_, high]| to_decimals(high, SHARE_DECIMALS)),
+                .map(|[_, high]| to_decimals(high, FRACTION_DECIMALS)),
             expected_limit_vmag: cell.expected_limit_vmag.map(mag),
             limit_vmag: limit.map(|limit| mag(limit.value)),
             limit_sigma_mag: limit.map(|limit| mag(limit.sigma)),

@@ -23,7 +23,7 @@ const METER_REACH_DEG: f64 = 30.0;
 /// measure the Moon, and a camera is saturated around it.
 pub(crate) const MOON_REACH_DEG: f64 = 10.0;
 /// Largest side of the cells in which the background is measured, in pixels: larger ones smooth clouds away.
-const MOST_MESH_PX: f64 = 64.0;
+const MAX_MESH_PX: f64 = 64.0;
 
 /// Why no brightness was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +37,7 @@ pub enum NoBrightness {
 
 impl NoBrightness {
     /// Why there is none in a frame with this clear sky, where its dark level is known or not.
-    pub(super) fn of(dark: Option<&DarkLevel>, clear_sky: &ClearSky) -> Self {
+    pub(super) fn diagnose(dark: Option<&DarkLevel>, clear_sky: &ClearSky) -> Self {
         match dark {
             None if !clear_sky.has_tone_curve() => Self::BiasUnknown,
             _ => Self::NotLinear,
@@ -173,8 +173,8 @@ impl SkyLevels {
         const SAMPLES: f64 = 60_000.0;
         let (width, height) = (picture.frame.width, picture.frame.height);
         let step = (((width * height) as f64 / SAMPLES).sqrt().ceil() as usize).max(1);
-        let circle = LensCircle::of(grid.camera());
-        let mesh_px = least_cell_px(frame.detections.spot_sigma_px).min(MOST_MESH_PX);
+        let circle = LensCircle::from_camera(grid.camera());
+        let mesh_px = least_cell_px(frame.detections.spot_sigma_px).min(MAX_MESH_PX);
         let background = BackgroundMap::measure(picture.frame, mesh_px as usize);
         let dark_adu = dark.map_or(0.0, |dark| dark.adu.value);
         let mut levels = Self {
@@ -266,14 +266,16 @@ impl SkyLevels {
     /// The brightness about the zenith; `None` where too little of it is in the frame.
     pub(super) fn zenith(&self, clear_sky: &ClearSky) -> Option<ZenithSky> {
         let light = self.brightness(&self.zenith, clear_sky, self.dark_sigma_adu);
-        light.filter(|_| self.shows_zenith()).map(ZenithSky::of)
+        light
+            .filter(|_| self.shows_zenith())
+            .map(ZenithSky::from_light)
     }
 
     /// Whether what a meter would see about the zenith is in the frame.
     pub(super) fn shows_zenith(&self) -> bool {
         /// The share of it that is at least.
-        const LEAST_SHARE: f64 = 0.9;
-        self.zenith_sr >= LEAST_SHARE * meter_solid_angle_sr()
+        const MIN_FRACTION: f64 = 0.9;
+        self.zenith_sr >= MIN_FRACTION * meter_solid_angle_sr()
     }
 
     /// The median level of the sky, in ADU.
@@ -349,7 +351,7 @@ impl LightSample {
 
 impl ZenithSky {
     /// What follows from its brightness.
-    pub(super) fn of(light: SkyLight) -> Self {
+    pub(super) fn from_light(light: SkyLight) -> Self {
         let mag = light.mag_arcsec2.value;
         Self {
             light,

@@ -39,7 +39,7 @@ impl SkyColorIndex {
             })
         };
         let stars: Vec<StandardStar> = stars.iter().filter_map(standard).collect();
-        zero_point::ColorIndex::of(&stars).map(Self)
+        zero_point::ColorIndex::fit(&stars).map(Self)
     }
 
     /// B−V of a sky with this light behind the filters.
@@ -78,7 +78,7 @@ struct FilteredSky {
 
 impl SkyColors {
     /// Those of a color picture whose level without light is known.
-    pub(super) fn of(
+    pub(super) fn measure(
         frame: &IdentifiedFrame,
         picture: &SkyPicture,
         dark: Option<&DarkLevel>,

@@ -11,7 +11,7 @@ pub(super) struct LensCircle {
 
 impl LensCircle {
     /// That of a camera.
-    pub(super) fn of(camera: &CameraModel) -> Self {
+    pub(super) fn from_camera(camera: &CameraModel) -> Self {
         Self {
             axis: camera.axis(),
             radius_px: camera.field_radius_px(),
@@ -36,7 +36,7 @@ mod tests {
         let model = DistortionModel::BrownConrady;
         let off_axis =
             camera.with_distortion(Some(Distortion::new(model, camera.radius_px(), &axis_px)));
-        let of = |camera: &CameraModel, place| LensCircle::of(camera).off_axis_sq(&place);
+        let of = |camera: &CameraModel, place| LensCircle::from_camera(camera).off_axis_sq(&place);
         let centre = camera.centre();
         assert!(of(&camera, centre) < 1e-12);
         let axis = PixelPoint::new(centre.x + 12.0, centre.y - 5.0);

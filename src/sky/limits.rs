@@ -2,7 +2,7 @@
 //! the centre by the camera's description, or without one that of the clear parts of the frame.
 
 use super::clouds::CellClouds;
-use super::witnesses::{CellStar, CloudInputs};
+use super::star_counts::{CellStar, CloudInputs};
 use crate::base::statistics::Estimate;
 use crate::photometry::completeness::{self, CountedStar};
 
@@ -85,12 +85,12 @@ fn measured_over_depth(
     const REACHES: [f64; 3] = [1.0, 2.0, 4.0];
     /// Stars above the expected limit. A choice by those that are found would prefer cells in which chance
     /// shows more.
-    const LEAST_BRIGHT: usize = 12;
+    const MIN_BRIGHT: usize = 12;
     /// Error for each doubling of the reach and each airmass, in magnitudes: what thresholds do not tell of stars
     /// elsewhere. By clear frames of scripts/all_sky.py.
     const ELSEWHERE_MAG: f64 = 0.05;
     /// Largest standard error.
-    const MOST_SIGMA_MAG: f64 = 0.5;
+    const MAX_SIGMA_MAG: f64 = 0.5;
     // Elsewhere stars tell nothing of the clouds here.
     let here = clouds[cell].extinction_mag?;
     let near = |reach: f64| -> Vec<CountedStar> {
@@ -107,7 +107,7 @@ fn measured_over_depth(
     };
     let is_enough = |stars: &[CountedStar]| {
         let bright = stars.iter().filter(|star| star.v_mag < expected);
-        bright.count() >= LEAST_BRIGHT
+        bright.count() >= MIN_BRIGHT
     };
     let mut reaches = REACHES
         .into_iter()
@@ -117,7 +117,7 @@ fn measured_over_depth(
     let airmass = sky.levels.cells[cell].airmass.unwrap_or(1.0);
     let elsewhere_mag = ELSEWHERE_MAG * airmass * doublings;
     let sigma = libm::hypot(libm::hypot(limit.sigma_mag, here.sigma), elsewhere_mag);
-    (sigma < MOST_SIGMA_MAG).then_some(Estimate {
+    (sigma < MAX_SIGMA_MAG).then_some(Estimate {
         value: limit.v_mag,
         sigma,
     })

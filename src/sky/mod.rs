@@ -33,9 +33,9 @@ mod limits;
 mod neighbor;
 mod picture;
 mod relative_limit;
+mod star_counts;
 mod stars;
 mod tone_curve;
-mod witnesses;
 
 pub(crate) use brightness::MOON_REACH_DEG;
 pub use brightness::{NoBrightness, SkyLight, ZenithSky};
@@ -55,8 +55,8 @@ use crate::photometry::IdentifiedFrame;
 use crate::photometry::association::associate;
 use brightness::SkyLevels;
 use grid::SkyCellGrid;
+use star_counts::CloudInputs;
 use tone_curve::{Curved, CurvedFrame};
-use witnesses::CloudInputs;
 
 /// The sky over a frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,17 +124,17 @@ pub(crate) fn measure(
     };
     let predicted = view.stars_to(catalog, crate::photometry::depth_v_mag(frame, catalog));
     let association = associate(frame, &predicted);
-    let stars = stars::of(frame, &association, &predicted, catalog);
+    let stars = stars::select(frame, &association, &predicted, catalog);
     let clear_sky = match usual {
         Some(usual) => *usual,
-        None => ClearSky::of(&stars, picture.is_flat)?,
+        None => ClearSky::measure(&stars, picture.is_flat)?,
     };
     let grid = SkyCellGrid::over(frame);
     let dark = dark_level(frame, picture);
     let is_proportional = is_proportional(picture, &clear_sky, usual.is_some());
     let color = dark
         .filter(|_| is_proportional)
-        .and_then(|dark| color::SkyColors::of(frame, picture, Some(&dark), &stars));
+        .and_then(|dark| color::SkyColors::measure(frame, picture, Some(&dark), &stars));
     let levels = SkyLevels::of(frame, picture, dark.as_ref(), &grid, &clear_sky, color);
     let measured = CurvedFrame {
         frame,
@@ -150,7 +150,7 @@ pub(crate) fn measure(
         (false, _) if usual.is_some() => None,
         (false, _) => measured.with_unknown_curve(),
     };
-    let no_brightness = || NoBrightness::of(dark.as_ref(), &clear_sky);
+    let no_brightness = || NoBrightness::diagnose(dark.as_ref(), &clear_sky);
     let no_brightness = curved.is_none().then(no_brightness);
     let depths = depth::depths(&levels, &clear_sky);
     let sky = CloudInputs {
@@ -164,10 +164,10 @@ pub(crate) fn measure(
         chance: association.chance,
         is_usual: usual.is_some(),
     };
-    let witnesses = sky.witnesses();
+    let witnesses = sky.star_counts();
     let clouds::CloudMap {
         cells: clouds,
-        share,
+        fraction: share,
     } = sky.clouds(&witnesses, &levels);
     let limits = limits::limits(&sky, &witnesses, &clouds, stated);
     let light = |cell: usize| curved.as_ref().and_then(|curved| curved.cells[cell]);

@@ -10,9 +10,9 @@ pub(super) type Place = (UnitVector<Icrs>, f64);
 pub(super) fn neighbor(all: &[Place], one: usize) -> Option<usize> {
     const NEAR_DEG: f64 = 6.0;
     /// Largest error of the other star, over its own.
-    const MOST: f64 = 2.0;
+    const MAX: f64 = 2.0;
     let (direction, sigma_mag) = &all[one];
-    let is_other = |&other: &usize| other != one && all[other].1 < MOST * sigma_mag;
+    let is_other = |&other: &usize| other != one && all[other].1 < MAX * sigma_mag;
     let cosine = |other: usize| (all[other].0.dot(direction), other);
     let others = (0..all.len()).filter(is_other).map(cosine);
     let (cosine, nearest) = others.max_by(|a, b| a.0.total_cmp(&b.0))?;

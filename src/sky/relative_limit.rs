@@ -1,7 +1,7 @@
 //! The completeness of a clear sky.
 
 use super::clear_sky::ClearSky;
-use super::witnesses::CellStar;
+use super::star_counts::CellStar;
 use crate::photometry::completeness::{self, CountedStar, Limit};
 
 /// The magnitude at which half of the stars are detected, over that of the threshold: about 0.
@@ -18,7 +18,7 @@ impl RelativeLimit {
         chance: f64,
     ) -> Option<Self> {
         /// Largest share of bright stars that is lost under a clear sky: doubles, wrong magnitudes.
-        const MOST_LOST: f64 = 0.05;
+        const MAX_LOST: f64 = 0.05;
         /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
         const DIMMED_SIGMAS: f64 = 3.0;
         let is_dimmed = |witness: &&CellStar| {
@@ -45,7 +45,7 @@ impl RelativeLimit {
             .collect();
         let limit = completeness::measure(&counted, chance).limit.ok()?;
         Some(Self(Limit {
-            lost: limit.lost.min(MOST_LOST),
+            lost: limit.lost.min(MAX_LOST),
             ..limit
         }))
     }

@@ -32,7 +32,7 @@ pub(super) struct SkyStar {
 }
 
 /// The stars of a frame that are alone at their places.
-pub(super) fn of(
+pub(super) fn select(
     frame: &IdentifiedFrame,
     association: &Association,
     predicted: &[PredictedStar],
@@ -40,7 +40,7 @@ pub(super) fn of(
 ) -> Vec<SkyStar> {
     let found = frame.identification;
     let camera = &found.camera;
-    let circle = LensCircle::of(camera);
+    let circle = LensCircle::from_camera(camera);
     let inside = predicted.iter().filter(|star| camera.contains(&star.pixel));
     let both = association.stars.iter().zip(inside);
     let clear = both.filter(|(star, _)| star.is_clear);

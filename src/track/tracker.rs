@@ -41,7 +41,7 @@ const MAG_TOLERANCE: f64 = 1.5;
 /// Frames from one refinement of the camera to the next.
 const REFINED_EVERY: u64 = 8;
 /// The weight of one frame in the mean of what lacks in the stated errors, and in the zero point.
-const AVERAGED_SHARE: f64 = 0.05;
+const AVERAGED_FRACTION: f64 = 0.05;
 /// How far a full solution's scale may be off that of the frames before it.
 const SCALE_TOLERANCE: f64 = 0.02;
 /// A full solution's focal length that differs by more standard errors is of another camera.
@@ -343,7 +343,7 @@ impl<'a> Tracker<'a> {
     ) -> TrackerState {
         let config = self.context.detect_config(frame);
         let saturation_adu = config.saturation_adu(frame, &mut SaturationFinder::default());
-        let light = StarBrightness::of(
+        let light = StarBrightness::measure(
             solution,
             found,
             self.context.indexed.catalog(),
@@ -436,7 +436,7 @@ impl TrackerState {
         let light = &self.light;
         let faintest = light.zero_point_mag + instrumental_mag(light.least_flux_adu);
         let highest_adu = MAX_PEAK * f64::from(light.saturation_adu) - light.background_adu;
-        let most_flux_adu = highest_adu.max(1.0) / spot.peak_share();
+        let most_flux_adu = highest_adu.max(1.0) / spot.peak_fraction();
         let brightest = light.zero_point_mag + instrumental_mag(most_flux_adu);
         let rad_per_px = 1.0 / self.lens.camera().focal_length_px();
         let width_px = spot.width_px([0.0; 2]);
@@ -464,7 +464,7 @@ impl TrackerState {
     ) {
         let excess_variance_px2 = excess_px.powi(2) + pose.excess_variance_px2();
         self.excess_variance_px2 +=
-            AVERAGED_SHARE * (excess_variance_px2 - self.excess_variance_px2);
+            AVERAGED_FRACTION * (excess_variance_px2 - self.excess_variance_px2);
         self.frames += 1;
         if self.frames.is_multiple_of(REFINED_EVERY) {
             let used = pose.used_stars(stars);
@@ -491,7 +491,7 @@ impl TrackerState {
 }
 
 impl StarBrightness {
-    fn of(
+    fn measure(
         solution: &Solution,
         found: &Identification,
         catalog: &Catalog,
@@ -646,7 +646,7 @@ impl TrackBuffers {
             }
         }
         if stars.len() >= MIN_STARS {
-            *zero_point_mag += AVERAGED_SHARE * (typical - *zero_point_mag);
+            *zero_point_mag += AVERAGED_FRACTION * (typical - *zero_point_mag);
         }
     }
 }

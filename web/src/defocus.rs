@@ -4,7 +4,7 @@ use crate::stated::Stated;
 use crate::{json, progress, told};
 use serde::Deserialize;
 use starpipe::Interrupt;
-use starpipe::study::defocus::{Caller, DefocusReport, Noise, Plan};
+use starpipe::study::defocus::{Caller, DefocusReport, Noise, DefocusPlan};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wasm_bindgen::prelude::*;
 
@@ -29,9 +29,9 @@ pub fn defocus(study: &str) -> Result<String, JsError> {
         Some(stated) => {
             let scenario = stated.scenario()?;
             let noise = Noise::of_camera(&scenario).map_err(told)?;
-            Plan::of_camera(scenario, noise, &study.vmag).map_err(told)?
+            DefocusPlan::of_camera(scenario, noise, &study.vmag).map_err(told)?
         }
-        None => Plan::of_paper(Noise::of_paper()),
+        None => DefocusPlan::of_paper(Noise::of_paper()),
     };
     let mut plan = match study.count {
         Some(count) => plan.with_trials(count.max(1)),

@@ -209,7 +209,7 @@ impl Solved {
 /// A file without an image.
 #[wasm_bindgen]
 pub fn image_count(bytes: Vec<u8>) -> Result<usize, JsError> {
-    let pages = Pages::of(bytes, &mut Buffers::new()).map_err(told)?;
+    let pages = Pages::from_bytes(bytes, &mut Buffers::new()).map_err(told)?;
     Ok(pages.count())
 }
 

@@ -29,8 +29,8 @@ pub fn printable(text: &str) -> String {
 
 /// The beginning of a text that a message quotes; how long it is where it goes on.
 pub fn excerpt(text: &str) -> Cow<'_, str> {
-    const MOST: usize = 80;
-    match text.char_indices().nth(MOST) {
+    const MAX: usize = 80;
+    match text.char_indices().nth(MAX) {
         None => text.into(),
         Some((end, _)) => format!("{}… ({} characters)", &text[..end], text.chars().count()).into(),
     }

@@ -32,12 +32,12 @@ impl FrameStatistics {
     /// Measures `frame`. Without `exposure_s`, the exposure is that of its header.
     #[doc(alias = "E_i")]
     #[doc(alias = "sigma_gi")]
-    pub fn of(name: &str, frame: &Frame, exposure_s: Option<f64>) -> Self {
+    pub fn measure(name: &str, frame: &Frame, exposure_s: Option<f64>) -> Self {
         let pixels = frame.values();
         let values = pixels.iter().filter(|p| !p.is_nan());
         let moments = RobustMoments::of(values.clone().map(|&p| f64::from(p)));
         let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
-        let maxima = Maxima::of(frame);
+        let maxima = Maxima::count(frame);
         Self {
             frame: name.to_owned(),
             width: frame.width,
@@ -74,13 +74,13 @@ struct Maxima {
 impl Maxima {
     /// Counts the bright local maxima of `frame`. A hot pixel is isolated, and pairs of them or a
     /// bright column extend along one axis only; a star extends along both.
-    fn of(frame: &Frame) -> Self {
+    fn count(frame: &Frame) -> Self {
         /// Minimum height of a bright pixel, in sigmas.
         const BRIGHT_SIGMA: f64 = 8.0;
         /// Minimum light of a star on two opposite neighbors of its peak: in sigmas, and as a
         /// share of the peak. A Gaussian spot with a sigma of half a pixel has a third there.
         const NEIGHBORS_SIGMA: f64 = 4.0;
-        const NEIGHBORS_SHARE: f64 = 0.15;
+        const NEIGHBORS_FRACTION: f64 = 0.15;
         let mut maxima = Self::default();
         let floor = f64::from(frame.step_adu) / 2.0;
         let pixels = frame.values();
@@ -100,7 +100,7 @@ impl Maxima {
                 if peak < left.max(up) || peak <= right.max(down) {
                     continue;
                 }
-                let least = (NEIGHBORS_SIGMA * sigma).max(NEIGHBORS_SHARE * peak);
+                let least = (NEIGHBORS_SIGMA * sigma).max(NEIGHBORS_FRACTION * peak);
                 maxima.bright += 1;
                 maxima.star_like += usize::from(left + right > least && up + down > least);
             }

@@ -128,13 +128,13 @@ impl DarkStack {
         let groups: Vec<_> = self
             .exposures
             .iter()
-            .map(|exposure| ExposureGroup::of(&self, exposure, step_adu))
+            .map(|exposure| ExposureGroup::measure(&self, exposure, step_adu))
             .collect();
         let dark_current = self.dark_current(&groups);
         let reference = pattern_group(&groups);
         let pattern = reference.and_then(|group| {
             let noise_left = group.pixel_variance.map(|v| v / group.frames as f64);
-            Pattern::of(&group.means, width, noise_left, step_adu)
+            Pattern::measure(&group.means, width, noise_left, step_adu)
         });
         let longest = groups.last();
         let pixels = PixelData {

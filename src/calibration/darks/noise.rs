@@ -27,7 +27,7 @@ pub struct ExposureGroup {
 
 impl ExposureGroup {
     /// Measures the frames of one exposure; `step` is the step between grey levels.
-    pub(super) fn of(stack: &DarkStack, exposure: &ExposureStack, step: f64) -> Self {
+    pub(super) fn measure(stack: &DarkStack, exposure: &ExposureStack, step: f64) -> Self {
         /// Minimum noise, in steps. With less, most values are on one level.
         const MIN_NOISE_STEPS: f64 = 0.5;
         /// Variance of rounding to whole steps, in steps².

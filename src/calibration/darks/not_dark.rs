@@ -83,8 +83,8 @@ fn stars(frame: &FrameStatistics) -> Option<NotDarkReason> {
     /// Star-like spots expected in any dark frame (clusters of hot pixels, cosmic rays): a number,
     /// and a share of the bright pixels.
     const EXPECTED: f64 = 5.0;
-    const EXPECTED_SHARE: f64 = 0.01;
-    let most = EXPECTED + EXPECTED_SHARE * frame.bright as f64;
+    const EXPECTED_FRACTION: f64 = 0.01;
+    let most = EXPECTED + EXPECTED_FRACTION * frame.bright as f64;
     (frame.star_like as f64 > most).then_some(NotDarkReason::Stars {
         spots: frame.star_like,
     })
@@ -92,9 +92,9 @@ fn stars(frame: &FrameStatistics) -> Option<NotDarkReason> {
 
 fn bright(frame: &FrameStatistics, full_scale_adu: Option<f64>) -> Option<NotDarkReason> {
     /// Maximum mean of a dark frame, as a share of full scale.
-    const MAX_SHARE: f64 = 0.5;
+    const MAX_FRACTION: f64 = 0.5;
     let share = frame.mean_adu / full_scale_adu?;
-    (share > MAX_SHARE).then_some(NotDarkReason::Bright { share })
+    (share > MAX_FRACTION).then_some(NotDarkReason::Bright { share })
 }
 
 fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<NotDarkReason> {
@@ -103,7 +103,7 @@ fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<No
     /// Minimum difference from the median: in robust standard deviations, and as a share of the
     /// noise.
     const LEVEL_SIGMA: f64 = 8.0;
-    const LEVEL_NOISE_SHARE: f64 = 0.5;
+    const LEVEL_NOISE_FRACTION: f64 = 0.5;
     let alike = frames
         .iter()
         .filter(|other| is_same_exposure(other.exposure_s, frame.exposure_s));
@@ -113,7 +113,7 @@ fn other_level(frame: &FrameStatistics, frames: &[FrameStatistics]) -> Option<No
     }
     let (median_adu, scale) = median_and_sigma(&mut means);
     let mut sigmas: Vec<f64> = alike.map(|other| other.sigma_adu).collect();
-    let least = (LEVEL_SIGMA * scale).max(LEVEL_NOISE_SHARE * median(&mut sigmas));
+    let least = (LEVEL_SIGMA * scale).max(LEVEL_NOISE_FRACTION * median(&mut sigmas));
     ((frame.mean_adu - median_adu).abs() > least).then_some(NotDarkReason::OtherLevel {
         mean_adu: frame.mean_adu,
         median_adu,

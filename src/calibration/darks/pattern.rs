@@ -27,7 +27,7 @@ impl Pattern {
     /// glow or a gradient counts as columns and rows.
     /// # Reference
     /// EMVA Standard 1288, release 4.0 (2021), sect. 8.2.
-    pub(super) fn of(
+    pub(super) fn measure(
         means: &[f32],
         width: usize,
         noise_left: Option<f64>,
@@ -89,7 +89,7 @@ mod tests {
             .collect();
         means[7] = 4000.0;
         means[8] = f32::NAN;
-        let found = Pattern::of(&means, width, Some(1.0), 1.0).unwrap();
+        let found = Pattern::measure(&means, width, Some(1.0), 1.0).unwrap();
         // The sigma of n columns is known to 1/√(2n).
         assert!(
             (found.column_adu - 2.0).abs() < 5.0 * 2.0 / 800f64.sqrt(),
@@ -104,7 +104,7 @@ mod tests {
             "{found:?}"
         );
         let flat: Vec<f32> = (0..width * height).map(|_| normal(3.0) as f32).collect();
-        let found = Pattern::of(&flat, width, Some(9.0), 1.0).unwrap();
+        let found = Pattern::measure(&flat, width, Some(9.0), 1.0).unwrap();
         assert!(
             found.column_adu < 0.1 && found.row_adu < 0.1 && found.fixed_adu.unwrap() < 0.4,
             "{found:?}"

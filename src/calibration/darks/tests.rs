@@ -9,7 +9,7 @@ fn darks(frames: &[(Option<f64>, Frame)], config: &DarkConfig) -> Darks {
     let mut stack = DarkStack::new();
     for (number, (exposure_s, frame)) in frames.iter().enumerate() {
         let name = format!("{number}.fits");
-        let statistics = FrameStatistics::of(&name, frame, *exposure_s);
+        let statistics = FrameStatistics::measure(&name, frame, *exposure_s);
         stack.add(frame, statistics).unwrap();
     }
     stack.measure(config).unwrap()
@@ -113,7 +113,7 @@ fn sizes_that_differ_and_exposures_without_end_are_refused() {
     let mut stack = DarkStack::new();
     let mut add = |name: &str, pixels: usize, exposure_s| {
         let frame = frame(&vec![1.0; pixels]);
-        let statistics = FrameStatistics::of(name, &frame, Some(exposure_s));
+        let statistics = FrameStatistics::measure(name, &frame, Some(exposure_s));
         stack.add(&frame, statistics)
     };
     for exposure in 1..=MAX_EXPOSURES {

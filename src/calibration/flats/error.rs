@@ -3,7 +3,7 @@
 use crate::calibration::pixel_stack::OutOfMemory;
 
 /// Maximum share of saturated pixels in a flat.
-pub const MAX_SATURATED_SHARE: f64 = 0.01;
+pub const MAX_SATURATED_FRACTION: f64 = 0.01;
 
 /// Error of measuring flats.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +31,7 @@ pub enum FlatsError {
     #[error(
         "{frame} is overexposed: found {:.1} % of its pixels saturated, expected at most {} %",
         share * 100.0,
-        MAX_SATURATED_SHARE * 100.0
+        MAX_SATURATED_FRACTION * 100.0
     )]
     Overexposed {
         /// The frame.

@@ -26,7 +26,7 @@ mod report;
 mod stack;
 mod transfer;
 
-pub use error::{FlatsError, MAX_SATURATED_SHARE};
+pub use error::{FlatsError, MAX_SATURATED_FRACTION};
 pub use report::{FlatRow, FlatsReport, PairReport};
 pub use stack::{FlatConfig, FlatFrame, FlatStack, Flats};
 pub use transfer::{Gain, GainMethod, PairPoint};

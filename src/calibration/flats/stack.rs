@@ -1,6 +1,6 @@
 //! Accumulates flats and measures the detector from them.
 
-use super::error::{FlatsError, MAX_SATURATED_SHARE};
+use super::error::{FlatsError, MAX_SATURATED_FRACTION};
 use super::transfer::{Gain, PairPoint};
 use crate::base::size::Size;
 use crate::calibration::pixel_stack::{PixelStack, pooled_variances};
@@ -158,7 +158,7 @@ impl FlatStack {
                 (first_level, first.as_slice()),
                 (level_adu, above.as_slice()),
             ];
-            self.pairs.extend(PairPoint::of(pair, step_adu));
+            self.pairs.extend(PairPoint::measure(pair, step_adu));
         }
     }
 
@@ -180,7 +180,7 @@ impl FlatStack {
             height,
             nonuniformity: moments.sigma,
             pixel_nonuniformity: pixel_nonuniformity(&master, width, stack),
-            gain: Gain::of(&self.pairs, self.config.read_noise_e),
+            gain: Gain::measure(&self.pairs, self.config.read_noise_e),
             pairs: self.pairs,
             frames: self.frames,
             master,
@@ -188,12 +188,12 @@ impl FlatStack {
     }
 }
 
-/// The number of saturated pixels of `frame`, which must be at most [`MAX_SATURATED_SHARE`].
+/// The number of saturated pixels of `frame`, which must be at most [`MAX_SATURATED_FRACTION`].
 fn saturated_pixels(name: &str, frame: &Frame) -> Result<usize, FlatsError> {
     let full_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
     let saturated = frame.values().iter().filter(|p| **p >= full_adu).count();
     let share = saturated as f64 / frame.pixels.len() as f64;
-    if share > MAX_SATURATED_SHARE {
+    if share > MAX_SATURATED_FRACTION {
         return Err(FlatsError::Overexposed {
             frame: name.to_owned(),
             share,

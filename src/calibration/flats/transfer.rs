@@ -17,7 +17,7 @@ pub struct PairPoint {
 
 impl PairPoint {
     /// Compares two frames, given by level and pixels; `step_adu` is the step between grey levels.
-    pub(super) fn of(pair: [(f64, &[f32]); 2], step_adu: f64) -> Option<Self> {
+    pub(super) fn measure(pair: [(f64, &[f32]); 2], step_adu: f64) -> Option<Self> {
         /// Variance of rounding to whole steps, in steps².
         const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
         let [(one_level, one), (other_level, other)] = pair;
@@ -77,7 +77,7 @@ pub struct Gain {
 impl Gain {
     /// Measures the gain from `pairs`. `None` if there is no pair, or variance does not grow with
     /// signal.
-    pub(super) fn of(pairs: &[PairPoint], read_noise_e: Option<f64>) -> Option<Self> {
+    pub(super) fn measure(pairs: &[PairPoint], read_noise_e: Option<f64>) -> Option<Self> {
         /// Minimum ratio of the largest to the smallest signal for a line.
         const LINE_RANGE: f64 = 1.5;
         let signals = pairs.iter().map(|pair| pair.signal_adu);

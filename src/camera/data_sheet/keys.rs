@@ -114,7 +114,7 @@ pub const KEYS: &[Key<DataSheet>] = &[
 ];
 
 /// A share, 0 and 1 included.
-const SHARE: NumberRange = NumberRange::FromTo(0.0, 1.0);
+const FRACTION: NumberRange = NumberRange::FromTo(0.0, 1.0);
 /// Displacement by the lens, in pixels.
 const DISPLACEMENT_PX: NumberRange = NumberRange::FromTo(-1000.0, 1000.0);
 /// Distance of the axis from the frame's centre, in pixels.
@@ -124,7 +124,7 @@ const ABERRATION_PX: NumberRange = NumberRange::FromTo(-50.0, 50.0);
 
 /// The numbers of the imperfections, all of them optional.
 pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
-    key!(vignetting in imperfections, SHARE, "share of the light lost in the corners"),
+    key!(vignetting in imperfections, FRACTION, "share of the light lost in the corners"),
     key!(field_radius_deg in imperfections,
         NumberRange::FromTo(1.0, 110.0),
         "angle from the axis up to which a lens that is no pinhole images the sky, in degrees"
@@ -204,7 +204,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "standard deviation of the smoothing before that JPEG, in pixels"
     ),
     key!(response_sigma in imperfections,
-        SHARE,
+        FRACTION,
         "standard deviation of the pixels' response, relative to its mean (PRNU)"
     ),
     key!(dark_current_sigma in imperfections,
@@ -232,7 +232,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
         "standard deviation of the columns' bias, in grey levels"
     ),
     key!(blooming in imperfections,
-        SHARE,
+        FRACTION,
         "share of the charge above full well that flows along the column"
     ),
     key!(depth_um in imperfections,

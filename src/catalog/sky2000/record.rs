@@ -79,9 +79,9 @@ impl Sky2000Record<'_> {
     }
 
     fn has_faint_companion(&self) -> Parsed<bool> {
-        const LEAST_MMAG: i16 = 4000;
+        const MIN_MMAG: i16 = 4000;
         let fainter = self.magnitude(StarColumn::MagDifference)?;
-        Ok(fainter.is_some_and(|mmag| mmag >= LEAST_MMAG))
+        Ok(fainter.is_some_and(|mmag| mmag >= MIN_MMAG))
     }
 
     /// The bytes of a cell without padding.

@@ -151,12 +151,12 @@ fn report(arguments: &ReportArgs) -> Result<CommandOutput, CommandError> {
         ));
     }
     let nights = summary(&archive)?;
-    let page = page_path.map(|path| super::page::file(&path, &page::of(&archive, &nights)?));
+    let page = page_path.map(|path| super::page::file(&path, &page::build(&archive, &nights)?));
     let all_written = write_each(page);
     let text = match arguments.format {
         OutputFormat::Text => nights_text(&nights),
         OutputFormat::Json => json_lines(nights.iter())?,
-        OutputFormat::Csv => csv_table(nights.iter().map(NightLine::of))?,
+        OutputFormat::Csv => csv_table(nights.iter().map(NightLine::from_night))?,
     };
     let exit = if damaged.is_empty() {
         Exit::Success

@@ -24,7 +24,7 @@ pub(super) struct NightLine<'a> {
 }
 
 impl<'a> NightLine<'a> {
-    pub(super) fn of(night: &'a CameraNight) -> Self {
+    pub(super) fn from_night(night: &'a CameraNight) -> Self {
         Self {
             night: &night.night,
             camera: &night.camera,

@@ -13,7 +13,7 @@ use starpipe::report::page::{Fact, PageContent, PageFigure};
 use std::collections::BTreeMap;
 
 /// Points of a figure; with more frames, each is the median of several.
-const MOST_POINTS: usize = 400;
+const MAX_POINTS: usize = 400;
 /// Longer runs have their dates in days, shorter ones in hours.
 const LONG_DAYS: f64 = 2.0;
 
@@ -21,7 +21,7 @@ const NO_PICTURES: &str =
     "There are no pictures of the frames that failed: none of them can be read where it was.";
 
 /// The page of the frames and nights of an archive.
-pub(super) fn of(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result<PageContent> {
+pub(super) fn build(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result<PageContent> {
     let mut frames = frames(archive)?;
     let failed = |frame: &FrameSummary| !frame.is_identified();
     let reasons = reasons(frames.iter().filter(|frame| failed(frame)));
@@ -41,7 +41,7 @@ pub(super) fn of(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result<Pa
     }
     tables.push(table(
         "Nights",
-        &csv_table(nights.iter().map(NightLine::of))?,
+        &csv_table(nights.iter().map(NightLine::from_night))?,
     )?);
     tables.push(table("Frames", &csv_table(frames.iter())?)?);
     Ok(PageContent {
@@ -176,7 +176,7 @@ fn limits(frames: &[FrameSummary]) -> anyhow::Result<Vec<PageFigure>> {
     } else {
         ("hours", 24.0)
     };
-    let together = dated.len().div_ceil(MOST_POINTS);
+    let together = dated.len().div_ceil(MAX_POINTS);
     let points = |value: fn(&FrameSummary) -> Option<f64>| -> Vec<(f64, f64)> {
         let point = |chunk: &[(f64, &FrameSummary)]| {
             let known = chunk
@@ -200,8 +200,8 @@ fn limits(frames: &[FrameSummary]) -> anyhow::Result<Vec<PageFigure>> {
     }
     let panel = Panel {
         title: "Half of the stars are found at".to_owned(),
-        x: Axis::of(format!("{unit} since the first frame")),
-        y: Axis::of("V"),
+        x: Axis::new(format!("{unit} since the first frame")),
+        y: Axis::new("V"),
         layers,
     };
     let caption = match together {

@@ -18,8 +18,8 @@ pub(super) fn sheet(measured: &LensCalibration) -> Sheet {
 fn axes(coverage: &Coverage) -> [Axis; 2] {
     let [width, height] = size_px(coverage);
     [
-        Axis::of("x (px)").within(0.0, width),
-        Axis::of("−y (px)").within(-height, 0.0),
+        Axis::new("x (px)").within(0.0, width),
+        Axis::new("−y (px)").within(-height, 0.0),
     ]
 }
 

@@ -93,7 +93,7 @@ pub(crate) fn calibrate(arguments: CalibrateArgs) -> Result<CommandOutput, Comma
     let measured = measure(frames, left_out).map_err(anyhow::Error::from)?;
     let report = LensReport::new(&measured);
     let page = arguments.page_path().map(|path| {
-        let page = page::of(&measured, &report, unread, catalog)?;
+        let page = page::build(&measured, &report, unread, catalog)?;
         super::page::file(&path, &page)
     });
     let all_written = write_each(files(&arguments, &measured, page));

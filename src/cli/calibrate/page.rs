@@ -16,7 +16,7 @@ const ENOUGH_COVERAGE: f64 = 0.9;
 const SHOWN: usize = 10;
 
 /// The page of a lens. `unread` files could not be read.
-pub(super) fn of(
+pub(super) fn build(
     measured: &LensCalibration,
     report: &LensReport,
     unread: usize,

@@ -7,7 +7,7 @@ use starpipe::calibration::darks::Darks;
 /// Bars, at most.
 const BARS: usize = 60;
 /// Share of the pixels, at either end, that decides how far a figure reaches.
-const END_SHARE: f64 = 1e-3;
+const END_FRACTION: f64 = 1e-3;
 /// A figure reaches farther than this by half.
 const ROOM: f64 = 0.5;
 
@@ -39,7 +39,7 @@ fn histogram(title: &str, axis: &str, values: &[f32], step: f64) -> Option<Panel
     let finite = || values.iter().filter(|value| value.is_finite());
     let mut sorted: Vec<f32> = finite().copied().collect();
     let last = sorted.len().checked_sub(1)?;
-    let end = (END_SHARE * last as f64) as usize;
+    let end = (END_FRACTION * last as f64) as usize;
     sorted.sort_unstable_by(f32::total_cmp);
     let [low, high] = [end, last - end].map(|place| f64::from(sorted[place]));
     let room = (ROOM * (high - low)).max(f64::from(f32::EPSILON) * high.abs().max(1.0));
@@ -71,10 +71,10 @@ fn histogram(title: &str, axis: &str, values: &[f32], step: f64) -> Option<Panel
     };
     Some(Panel {
         title: format!("{title}; {} beyond", counted(beyond, "pixel")),
-        x: Axis::of(axis).within(low, high),
+        x: Axis::new(axis).within(low, high),
         y: Axis {
             from: Some(0.0),
-            ..Axis::of("pixels")
+            ..Axis::new("pixels")
         },
         layers: vec![PlotLayer::unnamed(
             BLUE,

@@ -6,7 +6,7 @@ use starpipe::base::table::finished;
 use starpipe::calibration::darks::{Darks, ExposureGroup, HotPixelRow};
 
 /// Names and contents of the files for `--out`.
-pub(super) fn of(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+pub(super) fn build(darks: &Darks) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     for group in &darks.groups {
         let name = match group.exposure_s {

@@ -10,7 +10,7 @@ use super::options::format::OutputFormat;
 use super::options::frames::{FrameOptions, PageOption};
 use super::options::threads::ThreadOptions;
 use super::options::values;
-use super::output::files::{NewFile, made, make_directory, write_each};
+use super::output::files::{NewFile, generated, make_directory, write_each};
 use super::output::messages::report_warning;
 use super::output::overwrite;
 use super::output::rows::{csv_table, json_line};
@@ -88,7 +88,7 @@ impl FromStr for ExposureOf {
 
 /// `starpipe darks`
 pub(crate) fn darks(arguments: DarksArgs) -> Result<CommandOutput, CommandError> {
-    let (frames, failed) = FrameList::of(arguments.frames.frames.clone())?.reported();
+    let (frames, failed) = FrameList::expand(arguments.frames.frames.clone())?.reported();
     check_exposures(&arguments.exposure, &frames)?;
     let page_path = arguments.page_path(&frames)?;
     let config = arguments.config()?;
@@ -97,7 +97,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<CommandOutput, CommandError>
     let measure = |path: &Path, frame: Frame<'static>| {
         let name = path.display().to_string();
         let exposure_s = exposure_of(path, &arguments.exposure);
-        let statistics = FrameStatistics::of(&name, &frame, exposure_s);
+        let statistics = FrameStatistics::measure(&name, &frame, exposure_s);
         (frame, statistics)
     };
     let take = |(frame, statistics): (Frame, FrameStatistics)| Ok(stack.add(&frame, statistics)?);
@@ -113,7 +113,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<CommandOutput, CommandError>
         Some(directory) => results(directory, &darks, &frames)?,
         None => Vec::new(),
     };
-    let page = page_path.map(|path| super::page::file(&path, &page::of(&darks, unread)?));
+    let page = page_path.map(|path| super::page::file(&path, &page::build(&darks, unread)?));
     let all_written = write_each(results.into_iter().chain(page));
     let outcome = CommandOutput {
         text: match arguments.format {
@@ -121,7 +121,7 @@ pub(crate) fn darks(arguments: DarksArgs) -> Result<CommandOutput, CommandError>
             OutputFormat::Json => json_line(&darks.report())?,
             OutputFormat::Csv => csv_table(darks.frame_rows())?,
         },
-        exit: Exit::of(failed || unread > 0),
+        exit: Exit::failure_if(failed || unread > 0),
     };
     Ok(outcome.if_written(all_written))
 }
@@ -180,7 +180,7 @@ fn results(
     darks: &Darks,
     frames: &[PathBuf],
 ) -> Result<Vec<anyhow::Result<NewFile>>, CommandError> {
-    let files = make_directory(directory).and_then(|()| files::of(darks));
+    let files = make_directory(directory).and_then(|()| files::build(darks));
     let placed = |(name, content)| (directory.join::<String>(name), content);
     let files = files.map(|files| files.into_iter().map(placed).collect::<Vec<NewFile>>());
     let paths: Vec<PathBuf> = files
@@ -189,5 +189,5 @@ fn results(
         .map(|(path, _)| path.clone())
         .collect();
     overwrite::check_results(frames, &paths)?;
-    Ok(made(files))
+    Ok(generated(files))
 }

@@ -9,14 +9,14 @@ use starpipe::calibration::darks::{Darks, DarksReport};
 use starpipe::report::page::{Fact, PageContent};
 
 /// Hot pixels in the table: a detector with more is better looked at in hot-pixels.csv.
-const MOST_HOT: usize = 5000;
+const MAX_HOT: usize = 5000;
 
 /// The page of what was measured. `unread` files could not be read.
-pub(super) fn of(darks: &Darks, unread: usize) -> anyhow::Result<PageContent> {
+pub(super) fn build(darks: &Darks, unread: usize) -> anyhow::Result<PageContent> {
     let report = darks.report();
     let hot: String = hot_pixels_table(darks)?
         .split_inclusive('\n')
-        .take(MOST_HOT + 1)
+        .take(MAX_HOT + 1)
         .collect();
     let drawing = figure::sheet(darks);
     let figures = if drawing.is_empty() {
@@ -91,9 +91,9 @@ fn notes(report: &DarksReport, unread: usize) -> Vec<String> {
     if unread > 0 {
         notes.push(format!("{} could not be read.", counted(unread, "file")));
     }
-    if report.hot_pixels.count > MOST_HOT {
+    if report.hot_pixels.count > MAX_HOT {
         notes.push(format!(
-            "The table has the first {MOST_HOT} hot pixels; --out writes all of them."
+            "The table has the first {MAX_HOT} hot pixels; --out writes all of them."
         ));
     }
     notes

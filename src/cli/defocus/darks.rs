@@ -45,7 +45,7 @@ fn measure(
 ) -> anyhow::Result<Darks> {
     let mut stack = DarkStack::new();
     let measure = |path: &Path, frame: Frame<'static>| {
-        let statistics = FrameStatistics::of(&path.display().to_string(), &frame, None);
+        let statistics = FrameStatistics::measure(&path.display().to_string(), &frame, None);
         (frame, statistics)
     };
     let take = |(frame, statistics): (Frame, FrameStatistics)| Ok(stack.add(&frame, statistics)?);
@@ -83,7 +83,7 @@ fn named_frames(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
             inputs.extend(matching(&text)?);
         }
     }
-    let mut list = FrameList::of(inputs)?;
+    let mut list = FrameList::expand(inputs)?;
     let Some(last) = list.errors.pop() else {
         return Ok(list.paths);
     };

@@ -32,7 +32,7 @@ const PAPER_SPOTS_PX: [f64; 2] = [0.6, 1.5];
 const SECTION_LINES: usize = 4;
 
 /// Names and contents of the files.
-pub(super) fn of(
+pub(super) fn draw(
     report: &DefocusReport,
     studies: &[StarStudy],
     form: FigureForm,
@@ -70,7 +70,7 @@ fn noise_axis(report: &DefocusReport) -> Axis {
     let [from, to] = report.noises;
     let axis = match report.noise_unit {
         "e" => Axis::log("noise of a pixel in the dark (e)", true),
-        unit => Axis::of(format!("noise ({unit})")),
+        unit => Axis::new(format!("noise ({unit})")),
     };
     axis.within(from, to)
 }
@@ -86,7 +86,7 @@ fn noise_label(report: &DefocusReport, noise: f64) -> String {
 
 fn radius_axis(report: &DefocusReport) -> Axis {
     let [from, to] = report.radii_px;
-    Axis::of("radius (px)").within(from, to)
+    Axis::new("radius (px)").within(from, to)
 }
 
 fn title_of(study: &StarStudy, title: &str) -> String {
@@ -209,8 +209,8 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     };
     Panel {
         title: format!("a spot of radius {} px", five_digits(spot_px)),
-        x: Axis::of("column (px)"),
-        y: Axis::of("row (px)"),
+        x: Axis::new("column (px)"),
+        y: Axis::new("row (px)"),
         layers: vec![PlotLayer::colored(cells, levels)],
     }
 }
@@ -430,7 +430,7 @@ fn best_radii(report: &DefocusReport) -> Panel {
     Panel {
         title: "Best radius, and those whose error is at most 5 % larger".to_owned(),
         x: noise_axis(report),
-        y: Axis::of("radius (px)"),
+        y: Axis::new("radius (px)"),
         layers: layers.collect(),
     }
 }
@@ -464,7 +464,7 @@ fn accuracy_and_reach(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLORS);
     Panel {
         title: "Accuracy against reach; numbers: radius (px), grey: Cramér-Rao bound".to_owned(),
-        x: Axis::of("half of the stars are found at V"),
+        x: Axis::new("half of the stars are found at V"),
         y: Axis::log("error of the centroid (px)", true),
         layers: stars
             .flat_map(|(star, color)| accuracy_of(star, color))

@@ -11,7 +11,7 @@ pub(crate) use args::DefocusArgs;
 
 use super::exit::{CommandError, CommandOutput, Exit};
 use super::options::format::OutputFormat;
-use super::output::files::{made, write_each, write_into};
+use super::output::files::{generated, write_each, write_into};
 use super::output::messages::report_warning;
 use super::output::rows::{json_indented, json_line};
 use super::progress::bar;
@@ -35,12 +35,11 @@ pub(crate) fn defocus(arguments: &DefocusArgs) -> Result<CommandOutput, CommandE
     for warning in &warnings {
         report_warning(warning);
     }
-    let results = arguments
-        .out
-        .as_ref()
-        .is_none_or(|directory| write_into(directory, made(files(arguments, &report, &studies))));
+    let results = arguments.out.as_ref().is_none_or(|directory| {
+        write_into(directory, generated(files(arguments, &report, &studies)))
+    });
     let page = page_path.map(|path| {
-        let page = page::of(arguments, &report, &studies, warnings)?;
+        let page = page::build(arguments, &report, &studies, warnings)?;
         crate::cli::page::file(&path, &page)
     });
     let all_written = write_each(page) && results;
@@ -108,6 +107,6 @@ fn files(
         ("defocus.txt", report.to_text()),
     ];
     let texts = texts.map(|(name, text)| (name.to_owned(), text.into_bytes()));
-    let figures = figures::of(report, studies, arguments.figures)?;
+    let figures = figures::draw(report, studies, arguments.figures)?;
     Ok(texts.into_iter().chain(figures).collect())
 }

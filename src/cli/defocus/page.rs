@@ -9,7 +9,7 @@ use starpipe::report::page::{Fact, PageContent, PageFigure};
 use starpipe::study::defocus::{DefocusReport, DefocusStarReport, StarStudy};
 
 /// The page of the results; `notes` are what was warned of.
-pub(super) fn of(
+pub(super) fn build(
     arguments: &DefocusArgs,
     report: &DefocusReport,
     studies: &[StarStudy],

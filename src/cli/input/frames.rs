@@ -25,7 +25,7 @@ pub(crate) struct FrameList {
 
 impl FrameList {
     /// Replaces each directory by the frames in it, whatever they are of.
-    pub(crate) fn of(inputs: Vec<PathBuf>) -> Result<Self, CommandError> {
+    pub(crate) fn expand(inputs: Vec<PathBuf>) -> Result<Self, CommandError> {
         Self::with(inputs, |directory| {
             let frames = frame::files_in(directory)?;
             Ok(Folder {
@@ -37,7 +37,7 @@ impl FrameList {
 
     /// Replaces each directory by the frames of the sky in it.
     pub(crate) fn of_sky(inputs: Vec<PathBuf>, cameras: Cameras) -> Result<Self, CommandError> {
-        Self::with(inputs, |directory| Folder::of(directory, cameras))
+        Self::with(inputs, |directory| Folder::read(directory, cameras))
     }
 
     fn with(

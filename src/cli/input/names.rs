@@ -40,7 +40,7 @@ pub(crate) fn frame_names(
             let text = text.context("reading a list of frames from standard input")?;
             add_lines(&text, &mut names);
         } else if input.is_dir() {
-            add(Folder::of(input, cameras)?, &mut names)?;
+            add(Folder::read(input, cameras)?, &mut names)?;
         } else if is_pattern(input) {
             add(Folder::sorted(matching(input)?, cameras), &mut names)?;
         } else {

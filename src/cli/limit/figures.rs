@@ -69,7 +69,7 @@ fn panel(title: String, sweep: &Sweep, curves: Vec<SweepCurve>, scenario: &Scena
     Panel {
         title,
         x: Axis::log(sweep.parameter.title(), sweep.spacing == Spacing::Log).within(first, last),
-        y: Axis::of("limiting magnitude (V)"),
+        y: Axis::new("limiting magnitude (V)"),
         layers,
     }
 }

@@ -36,7 +36,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<CommandOutput, CommandError
     let page_path = arguments
         .html
         .checked_path(&inputs, || page_path(arguments))?;
-    let rows = rows::of(arguments, &scenario)?;
+    let rows = rows::predict(arguments, &scenario)?;
     let plot = arguments.plot.as_ref().map(|plot| {
         let sweeps = arguments.sweep.iter().map(|sweep| &sweep.0);
         let sheet = figures::of_sweeps(sweeps, &scenario)?;
@@ -44,7 +44,7 @@ pub(crate) fn limit(arguments: &LimitArgs) -> Result<CommandOutput, CommandError
     });
     let plot = plot.transpose()?;
     let page = page_path.map(|path| {
-        let page = page::of(&rows, arguments, &scenario)?;
+        let page = page::build(&rows, arguments, &scenario)?;
         crate::cli::page::file(&path, &page)
     });
     let all_written = write_each(plot.into_iter().chain(page));

@@ -19,7 +19,7 @@ const SWEPT_BY: f64 = 4.0;
 const SWEPT_VALUES: usize = 31;
 
 /// The page of the predictions `rows`.
-pub(super) fn of(
+pub(super) fn build(
     rows: &[PredictionRow],
     arguments: &LimitArgs,
     scenario: &Scenario,

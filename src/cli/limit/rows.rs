@@ -7,7 +7,7 @@ use starpipe::catalog::Catalog;
 use starpipe::model::sensitivity::{PredictionRow, Scenario};
 
 /// The prediction for the scenario, or for each value of the sweeps.
-pub(super) fn of(
+pub(super) fn predict(
     arguments: &LimitArgs,
     scenario: &Scenario,
 ) -> Result<Vec<PredictionRow>, CommandError> {

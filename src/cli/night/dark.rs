@@ -14,7 +14,7 @@ pub(super) fn learn(run: &NightRun, names: &[String], start: &NightStart) -> Opt
     // By day, light is not as exposures are.
     let level = |_: &_, frame: Frame<'static>| {
         let is_dark = !is_by_day(frame.metadata.date.as_ref(), start.site);
-        is_dark.then(|| FrameLevel::of(&frame))?
+        is_dark.then(|| FrameLevel::measure(&frame))?
     };
     let levels = of_each(names, run.pool, run.plan.memory, level);
     let levels: Vec<FrameLevel> = levels.into_iter().flatten().collect();

@@ -27,7 +27,7 @@ pub(super) fn learn(
         Some(OutlierPixels::of(&frame.into_stored(), mjd))
     });
     let found: Vec<OutlierPixels> = standouts.into_iter().flatten().collect();
-    hot_pixels(&found, start.held.as_ref(), start.site)
+    hot_pixels(&found, start.fixed_camera.as_ref(), start.site)
 }
 
 /// The list, as `--hot-pixels` reads it.

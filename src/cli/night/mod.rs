@@ -37,7 +37,7 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<CommandOutput, CommandError
     let (names, mut passed_over) = frame_names(&arguments.frames, Cameras::OneNight)?;
     passed_over.retain(|file| !is_own_result(&arguments.out, &file.path));
     let (catalog, tells) = (&arguments.catalog, !arguments.quiet);
-    catalog.with_index_told(tells, |pool, indexed| {
+    catalog.with_index_reporting(tells, |pool, indexed| {
         let names = order::by_date(names, pool, plan.memory);
         let owner = claim(arguments, &plan, &names, indexed.catalog())?;
         let (journal, kept) =
@@ -153,7 +153,7 @@ fn finish(
         history,
         start,
     } = measured;
-    let mut night = summarize(rows, start.site, history.knocks());
+    let mut night = summarize(rows, start.site, history.jumps());
     night.hot_pixels = beside.hot_pixels;
     night.passed_over = beside.passed_over;
     night.site_or_time.clone_from(&start.site_or_time);
@@ -173,7 +173,7 @@ fn finish(
     let directory: &Path = &arguments.out;
     let lens = lens.map(|lens| Ok((directory.join(files::LENS), lens.into_bytes())));
     let page = arguments.html.then(|| {
-        let page = page::of(rows, &night, &files::csv(rows)?)?;
+        let page = page::build(rows, &night, &files::csv(rows)?)?;
         super::page::file(&directory.join(files::PAGE), &page)
     });
     let results = files::of_rows(directory, rows, &night, &station);

@@ -7,7 +7,7 @@ use starpipe::night::{self, Moment, NightRow, NightSummary};
 use starpipe::report::page::{Fact, PageContent, PageFigure};
 
 /// The page of the frames of a night; `csv` is their table.
-pub(super) fn of(
+pub(super) fn build(
     rows: &[NightRow],
     summary: &NightSummary,
     csv: &str,
@@ -20,7 +20,7 @@ pub(super) fn of(
     });
     let mut tables = Vec::new();
     if !summary.moments.is_empty() {
-        let moments = summary.moments.iter().map(MomentLine::of);
+        let moments = summary.moments.iter().map(MomentLine::from_moment);
         tables.push(table("What changed", &csv_table(moments)?)?);
     }
     tables.push(table("Frames", csv)?);
@@ -51,7 +51,7 @@ struct MomentLine<'a> {
 }
 
 impl<'a> MomentLine<'a> {
-    fn of(moment: &'a Moment) -> Self {
+    fn from_moment(moment: &'a Moment) -> Self {
         Self {
             date: &moment.date,
             frame: moment.frame,

@@ -56,7 +56,7 @@ impl<'a> NightRun<'a> {
     ) -> Result<MeasuredNight, CommandError> {
         let progress = self.bar(names.len());
         let mut measured = MeasuredNight {
-            history: PointingHistory::new(start.held.as_ref().map(|held| held.pointing)),
+            history: PointingHistory::new(start.fixed_camera.as_ref().map(|held| held.pointing)),
             rows: Vec::with_capacity(names.len()),
             start,
         };
@@ -111,7 +111,7 @@ impl<'a> NightRun<'a> {
                 break;
             }
         }
-        NightStart::of(probes, self.context.lens.clone())
+        NightStart::from_probes(probes, self.context.lens.clone())
     }
 
     /// The rows of a batch.
@@ -126,7 +126,7 @@ impl<'a> NightRun<'a> {
         if let (Some(UtcOffset::Auto), Some(ahead)) = (context.utc_offset, measured.start.ahead) {
             context.utc_offset = Some(UtcOffset::Ahead(ahead));
         }
-        context.held = measured.held().map(Arc::new);
+        context.fixed_camera = measured.fixed_camera().map(Arc::new);
         let rows = NightRowSink {
             clear_ground_vmag: measured.start.clear_ground_vmag,
         };
@@ -166,9 +166,9 @@ impl MeasuredNight {
     }
 
     /// The camera as it is held now.
-    fn held(&self) -> Option<FixedCamera> {
-        let held = self.start.held.clone()?;
-        let (pointing, sigma_rad) = self.history.held()?;
+    fn fixed_camera(&self) -> Option<FixedCamera> {
+        let held = self.start.fixed_camera.clone()?;
+        let (pointing, sigma_rad) = self.history.fixed()?;
         Some(FixedCamera {
             pointing,
             sigma_rad,
@@ -184,7 +184,7 @@ impl Sink for Probes {
     type Made = Option<Probe>;
 
     fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
-        Probe::of(&image.to_string(), &solved.solution)
+        Probe::from_solution(&image.to_string(), &solved.solution)
     }
 }
 
@@ -199,9 +199,9 @@ impl Sink for NightRowSink {
     fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
         let (name, solution) = (image.to_string(), &solved.solution);
         let frame = solved.frame.as_ref();
-        match frame.and_then(|frame| NoSky::of(&image.to_path(), solution, frame)) {
+        match frame.and_then(|frame| NoSky::detect(&image.to_path(), solution, frame)) {
             Some(kind) => NightRow::passed_over(&name, solution, kind),
-            None => NightRow::of(&name, solution, self.clear_ground_vmag),
+            None => NightRow::from_solution(&name, solution, self.clear_ground_vmag),
         }
     }
 }

@@ -34,17 +34,17 @@ impl CatalogOptions {
         &self,
         work: impl FnOnce(&rayon::ThreadPool, &IndexedCatalog) -> Result<R, CommandError>,
     ) -> Result<R, CommandError> {
-        self.with_index_told(true, work)
+        self.with_index_reporting(true, work)
     }
 
     /// The same; with `tells`, progress and warnings are shown.
-    pub(crate) fn with_index_told<R>(
+    pub(crate) fn with_index_reporting<R>(
         &self,
         tells: bool,
         work: impl FnOnce(&rayon::ThreadPool, &IndexedCatalog) -> Result<R, CommandError>,
     ) -> Result<R, CommandError> {
         let pool = self.threads.pool()?;
-        let catalog = pool.install(|| self.read_told(tells))?;
+        let catalog = pool.install(|| self.read_reporting(tells))?;
         let indexed = pool.install(|| self.index(&catalog, tells));
         report_cache_errors(&indexed, tells);
         let result = work(&pool, &indexed);
@@ -54,10 +54,10 @@ impl CatalogOptions {
 
     /// Reads the catalogue, or takes the built-in one.
     pub(crate) fn read(&self) -> anyhow::Result<Cow<'static, Catalog>> {
-        self.read_told(true)
+        self.read_reporting(true)
     }
 
-    fn read_told(&self, tells: bool) -> anyhow::Result<Cow<'static, Catalog>> {
+    fn read_reporting(&self, tells: bool) -> anyhow::Result<Cow<'static, Catalog>> {
         let Some(path) = &self.catalog else {
             return Ok(Cow::Borrowed(Catalog::built_in()));
         };

@@ -13,7 +13,7 @@ pub(crate) struct Steps {
 
 impl Steps {
     /// Parses `range`, the whole or the end of `text`; `form` is the expected form of `text`.
-    fn of(range: &str, text: &str, form: &str) -> Result<Self, String> {
+    fn parse(range: &str, text: &str, form: &str) -> Result<Self, String> {
         let parts: Vec<&str> = range.split(':').collect();
         let (from, to, count, spacing) = match parts[..] {
             [from, to, count] => (from, to, count, Spacing::Linear),
@@ -38,7 +38,7 @@ impl FromStr for Steps {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::of(text, text, "FROM:TO:COUNT or FROM:TO:COUNT:log")
+        Self::parse(text, text, "FROM:TO:COUNT or FROM:TO:COUNT:log")
     }
 }
 
@@ -48,5 +48,5 @@ pub(crate) fn named_steps(text: &str) -> Result<(String, Steps), String> {
     let (name, range) = text
         .split_once('=')
         .ok_or_else(|| not_of_form(text, FORM))?;
-    Ok((name.replace('-', "_"), Steps::of(range, text, FORM)?))
+    Ok((name.replace('-', "_"), Steps::parse(range, text, FORM)?))
 }

@@ -58,7 +58,7 @@ pub(crate) fn write_into(
 }
 
 /// The files that were made together, or why none was.
-pub(crate) fn made<F>(files: anyhow::Result<Vec<F>>) -> Vec<anyhow::Result<F>> {
+pub(crate) fn generated<F>(files: anyhow::Result<Vec<F>>) -> Vec<anyhow::Result<F>> {
     match files {
         Ok(files) => files.into_iter().map(Ok).collect(),
         Err(error) => vec![Err(error)],

@@ -60,7 +60,7 @@ impl Journal {
             is_in_order: true,
         };
         let text = journal.text()?;
-        let found = Lines::<Row>::of(&text, owner, frames);
+        let found = Lines::<Row>::parse(&text, owner, frames);
         found.tell(path);
         let kept = found.kept_text();
         if kept != text {
@@ -91,7 +91,7 @@ impl Journal {
             return Ok(());
         }
         let text = self.text()?;
-        let kept = Lines::<Row>::of(&text, &self.owner, &self.frames).kept_text();
+        let kept = Lines::<Row>::parse(&text, &self.owner, &self.frames).kept_text();
         self.rewrite(&kept)
     }
 
@@ -131,7 +131,7 @@ struct Lines<'t, Row> {
 }
 
 impl<'t, Row: JournalRow> Lines<'t, Row> {
-    fn of(text: &'t [u8], owner: &str, frames: &[String]) -> Self {
+    fn parse(text: &'t [u8], owner: &str, frames: &[String]) -> Self {
         let places: HashMap<&str, usize> = frames
             .iter()
             .enumerate()

@@ -38,15 +38,15 @@ pub(crate) fn report(message: impl Display) {
 /// What a message says, on one line that people can read: of a long one the ends.
 pub(crate) fn line(message: &str) -> String {
     /// Longer than any that quotes paths.
-    const MOST: usize = 12_000;
+    const MAX: usize = 12_000;
     const END: usize = 2000;
     let count = message.chars().count();
-    if count <= MOST {
+    if count <= MAX {
         return printable(message);
     }
-    let start: String = message.chars().take(MOST - END).collect();
+    let start: String = message.chars().take(MAX - END).collect();
     let end: String = message.chars().skip(count - END).collect();
-    let left_out = count - MOST;
+    let left_out = count - MAX;
     printable(&format!("{start}… ({left_out} characters) …{end}"))
 }
 

@@ -19,7 +19,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    pub(crate) fn of(title: impl Into<String>) -> Self {
+    pub(crate) fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
             ..Self::default()
@@ -30,7 +30,7 @@ impl Axis {
     pub(crate) fn log(title: impl Into<String>, is_log: bool) -> Self {
         Self {
             is_log,
-            ..Self::of(title)
+            ..Self::new(title)
         }
     }
 

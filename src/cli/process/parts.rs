@@ -31,7 +31,7 @@ pub(super) fn process_parts(
     let SolvingOptions {
         catalog, output, ..
     } = &arguments.solving;
-    catalog.with_index_told(!output.quiet, |pool, indexed| {
+    catalog.with_index_reporting(!output.quiet, |pool, indexed| {
         let ProcessArgs {
             calibration, page, ..
         } = arguments;

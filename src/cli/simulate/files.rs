@@ -62,7 +62,7 @@ pub(super) struct FrameFiles {
 
 impl FrameFiles {
     /// The files that the options name.
-    pub(super) fn of(
+    pub(super) fn from_arguments(
         arguments: &SimulateArgs,
         subject: &FrameSubject,
         sheet: &DataSheet,

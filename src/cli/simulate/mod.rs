@@ -31,7 +31,7 @@ use subject::FrameSubject;
 pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<CommandOutput, CommandError> {
     let setup = arguments.setup.setup()?;
     let subject = FrameSubject::of(arguments, &setup)?;
-    let files = FrameFiles::of(arguments, &subject, &setup.scenario.camera)?;
+    let files = FrameFiles::from_arguments(arguments, &subject, &setup.scenario.camera)?;
     let pool = arguments.catalog.threads.pool()?;
     let catalog = pool.install(|| arguments.catalog.read())?;
     let simulator = Simulator::new(&setup.scenario, &setup.scene, catalog.stars())

@@ -58,7 +58,10 @@ impl SimulationRecord {
             height: simulated.frame.height,
             exposure_s: generator.setup.scenario.conditions.exposure_s,
             date: generator.date.map(|date| date.to_iso()),
-            attitude: simulated.attitude().as_ref().map(AttitudeRecord::of),
+            attitude: simulated
+                .attitude()
+                .as_ref()
+                .map(AttitudeRecord::from_rotation),
             focal_length_px: camera.central_focal_length_px(),
             fov_x_deg: camera.fov_x_rad().map(|fov_rad| fov_rad * DEG_PER_RAD),
             mirrored: camera.mirrored,
@@ -89,7 +92,7 @@ impl SimulationRecord {
 }
 
 impl AttitudeRecord {
-    fn of(icrs_to_camera: &Rotation<Icrs, Camera>) -> Self {
+    fn from_rotation(icrs_to_camera: &Rotation<Icrs, Camera>) -> Self {
         let (boresight, up_pa_rad) = icrs_to_camera.boresight_and_up();
         let (ra_rad, dec_rad) = boresight.to_ra_dec();
         Self {

@@ -49,7 +49,7 @@ enum RemainingInput {
 }
 
 impl<'a> Images<'a> {
-    pub(super) fn of(inputs: &'a Inputs, path: &'a Path) -> Self {
+    pub(super) fn new(inputs: &'a Inputs, path: &'a Path) -> Self {
         Self {
             inputs,
             path,
@@ -63,7 +63,7 @@ impl<'a> Images<'a> {
         context: &Context,
         workspace: &mut Workspace,
     ) -> Option<(ImageName<'a>, anyhow::Result<SolvedImage>)> {
-        let image = ImageName::of(self.path);
+        let image = ImageName::new(self.path);
         match (
             mem::replace(&mut self.left, RemainingInput::Nothing),
             self.inputs,
@@ -93,7 +93,7 @@ impl<'a> Images<'a> {
         context: &Context,
         workspace: &mut Workspace,
     ) -> Option<(ImageName<'a>, anyhow::Result<SolvedImage>)> {
-        let image = ImageName::of(self.path).page(pages.advance()?);
+        let image = ImageName::new(self.path).page(pages.advance()?);
         let read = |buffers: &mut Buffers| {
             let frame = pages.image(buffers);
             frame.map_err(|error| error.in_file(&image.to_path()))

@@ -64,7 +64,7 @@ pub(crate) fn report_all(
     let files = ResultFiles::new(&output, plan.memory)?;
     let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
-        catalog.with_index_told(!output.quiet, |pool, indexed| {
+        catalog.with_index_reporting(!output.quiet, |pool, indexed| {
             let mut context = plan.context(indexed);
             context.measure_known_sky = true;
             let solver = InputSolver {

@@ -44,7 +44,7 @@ impl<S: Sink> InputSolver<'_, S> {
         path: &Path,
         workspace: &mut Workspace,
     ) -> Vec<(String, anyhow::Result<S::Made>)> {
-        let mut images = Images::of(self.inputs, path);
+        let mut images = Images::new(self.inputs, path);
         let mut all = Vec::new();
         while let Some((image, solved)) = images.solve_next(&self.context, workspace) {
             let made = solved.and_then(|solved| self.make(&image, solved, workspace));

@@ -52,9 +52,9 @@ fn identification(found: &IdentificationSummary) -> Sheet {
         ),
         x: Axis {
             from: Some(0.0),
-            ..Axis::of("stars brighter than the predicted limit")
+            ..Axis::new("stars brighter than the predicted limit")
         },
-        y: Axis::of("% of the frames").within(lowest, 100.5),
+        y: Axis::new("% of the frames").within(lowest, 100.5),
         layers: vec![PlotLayer::new(
             "with 95 % intervals (Clopper-Pearson)",
             BLUE,
@@ -88,8 +88,8 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
     };
     Sheet::of_one(Panel {
         title,
-        x: Axis::of("V"),
-        y: Axis::of("% of isolated stars found").within(0.0, 103.0),
+        x: Axis::new("V"),
+        y: Axis::new("% of isolated stars found").within(0.0, 103.0),
         layers: vec![
             PlotLayer::guide(Marks::Levels(vec![50.0])),
             PlotLayer::new("predicted", ORANGE, Marks::Line(line.collect())),
@@ -137,7 +137,7 @@ fn centroids(found: &CentroidSummary) -> Sheet {
             Panel {
                 title: "The same in units of the bound".to_owned(),
                 x: snr(),
-                y: Axis::of("measured / bound"),
+                y: Axis::new("measured / bound"),
                 layers: vec![
                     PlotLayer::guide(Marks::Levels(vec![1.0])),
                     PlotLayer::new("± standard error", BLUE, Marks::Dots(ratios)),
@@ -173,10 +173,10 @@ fn pulls(found: &PullSummary) -> Sheet {
             "{name}: mean {:+.3}, standard deviation {:.3}",
             pull.mean, pull.sd
         ),
-        x: Axis::of("error / stated standard error").within(-5.0, 5.0),
+        x: Axis::new("error / stated standard error").within(-5.0, 5.0),
         y: Axis {
             from: Some(0.0),
-            ..Axis::of("density")
+            ..Axis::new("density")
         },
         layers: vec![
             PlotLayer::new(
@@ -218,10 +218,10 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
             "Faintest star minus expected: mean {:+.3} ± {:.3}, scatter {:.2} mag",
             found.mean, found.mean_sigma, found.sd
         ),
-        x: Axis::of("faintest star named minus the faintest expected (mag)").within(-1.5, 1.5),
+        x: Axis::new("faintest star named minus the faintest expected (mag)").within(-1.5, 1.5),
         y: Axis {
             from: Some(0.0),
-            ..Axis::of("density (1 / mag)")
+            ..Axis::new("density (1 / mag)")
         },
         layers,
     })
@@ -238,7 +238,7 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
     Sheet::of_one(Panel {
         title: format!("Errors of the attitude, of {} frames", found.frames),
         x: Axis::log("arcseconds", true),
-        y: Axis::of("% of the frames are off by less").within(0.0, 102.0),
+        y: Axis::new("% of the frames are off by less").within(0.0, 102.0),
         layers: vec![
             PlotLayer::new(
                 format!("boresight: half below {:.2}″", boresight.p50),
@@ -270,12 +270,12 @@ fn study(rows: &[StudyRow]) -> Sheet {
         panel("Identified correctly", rate, rates),
         panel(
             "Half of the stars are found at",
-            Axis::of("V"),
+            Axis::new("V"),
             limits(rows),
         ),
         panel(
             "Errors of centroids in units of the bound",
-            Axis::of("root mean square / bound"),
+            Axis::new("root mean square / bound"),
             vec![
                 PlotLayer::guide(Marks::Levels(vec![1.0])),
                 measured("± standard error", rows, |row| {
@@ -298,7 +298,7 @@ fn rates(rows: &[StudyRow]) -> (Axis, Vec<PlotLayer>) {
         (row.value, row.right_percent, interval)
     };
     let rates: Vec<Dot> = rows.iter().map(rate).collect();
-    let axis = Axis::of("% of the frames").within(lowest_percent(&rates), 100.5);
+    let axis = Axis::new("% of the frames").within(lowest_percent(&rates), 100.5);
     let layer = PlotLayer::new("with 95 % intervals", BLUE, Marks::Dots(rates));
     (axis, vec![layer])
 }

@@ -136,6 +136,6 @@ impl FailedFrames {
             picture
         });
         self.pictures.extend(pictures);
-        self.pictures.truncate(Thumbnail::MOST);
+        self.pictures.truncate(Thumbnail::MAX);
     }
 }

@@ -92,7 +92,7 @@ fn with_page(
             pool,
             frames: options.count,
             figures: options.figures,
-            pictures: page_path.as_ref().map(|_| Thumbnail::MOST.div_ceil(runs)),
+            pictures: page_path.as_ref().map(|_| Thumbnail::MAX.div_ceil(runs)),
             progress: frames_bar_with_speed(options.count * runs as u64),
             all_written: Cell::new(true),
         };

@@ -1,6 +1,6 @@
 //! What the runs of one command have in common.
 
-use crate::cli::output::files::{made, write_into};
+use crate::cli::output::files::{generated, write_into};
 use crate::cli::output::messages::report;
 use crate::cli::plot::{FigureForm, Sheet, figure_files};
 use indicatif::ProgressBar;
@@ -33,7 +33,7 @@ impl Shared<'_> {
         sheets: Vec<(&str, Sheet)>,
     ) {
         let file = |(name, text): (&str, String)| Ok((name.to_owned(), text.into_bytes()));
-        let figures = made(figure_files(sheets, self.figures));
+        let figures = generated(figure_files(sheets, self.figures));
         let files = texts.into_iter().map(file).chain(figures);
         let written = self.progress.suspend(|| write_into(directory, files));
         self.all_written.set(self.all_written.get() && written);

@@ -104,8 +104,8 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
     };
     let errors = |title: &str, x: &str, y: &str, marks: Marks| Panel {
         title: title.to_owned(),
-        x: Axis::of(x),
-        y: Axis::of(y),
+        x: Axis::new(x),
+        y: Axis::new(y),
         layers: vec![
             PlotLayer::guide(Marks::Levels(vec![0.0])),
             PlotLayer::new("frames", BLUE, marks),
@@ -146,8 +146,8 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
             ),
             Panel {
                 title: "Probability of a clear sky".to_owned(),
-                x: Axis::of("stated").within(0.0, 1.0),
-                y: Axis::of("share of cells below 0.2 mag").within(0.0, 1.0),
+                x: Axis::new("stated").within(0.0, 1.0),
+                y: Axis::new("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
                     PlotLayer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
                     PlotLayer::new("found", BLUE, Marks::Line(told.collect())),

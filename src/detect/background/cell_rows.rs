@@ -39,7 +39,7 @@ pub(crate) struct CellRow<'a, T> {
 
 impl<'a, T: Send> CellRows<'a, T> {
     /// All rows of cells of the mesh, with an output for each.
-    pub fn of(mesh: &'a mut Mesh, maxima: &'a mut BlockMaxima, outputs: &'a mut [T]) -> Self {
+    pub fn new(mesh: &'a mut Mesh, maxima: &'a mut BlockMaxima, outputs: &'a mut [T]) -> Self {
         Self {
             grid: mesh.grid,
             blocks_per_row: maxima.per_row,
@@ -88,7 +88,7 @@ impl<'a, T: Send> CellRows<'a, T> {
     }
 
     /// Calls `work` for each row of cells, on one thread for each of the `workers`.
-    pub fn share<W: Send>(
+    pub fn distribute<W: Send>(
         self,
         workers: &mut [W],
         work: &(impl Fn(&mut W, CellRow<'_, T>) + Sync),
@@ -99,7 +99,10 @@ impl<'a, T: Send> CellRows<'a, T> {
             let count = self.rows.len() * half / threads;
             let (first, rest) = self.split(count);
             let (some, others) = workers.split_at_mut(half);
-            rayon::join(|| first.share(some, work), || rest.share(others, work));
+            rayon::join(
+                || first.distribute(some, work),
+                || rest.distribute(others, work),
+            );
         } else if let Some(worker) = workers.first_mut() {
             self.each(|row| work(worker, row));
         }

@@ -66,8 +66,8 @@ impl FrameBackground {
         let grid = self.mesh.grid;
         self.lowest_adu.resize(grid.rows, 0.0);
         let mut no_maxima = BlockMaxima::default();
-        let cell_rows = CellRows::of(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
-        cell_rows.share(&mut self.workers, &|worker, cells| {
+        let cell_rows = CellRows::new(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
+        cell_rows.distribute(&mut self.workers, &|worker, cells| {
             if view.is_interrupted() {
                 return;
             }

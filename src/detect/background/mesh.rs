@@ -80,7 +80,7 @@ struct MeshPosition {
 
 impl MeshPosition {
     /// The nearest place between nodes.
-    fn held(self) -> Self {
+    fn clamped(self) -> Self {
         Self {
             across: self.across.clamp(0.0, 1.0),
             down: self.down.clamp(0.0, 1.0),
@@ -281,13 +281,13 @@ impl Mesh {
         let place = self.place(x, y);
         (
             self.blend(&self.background, place),
-            self.blend(&self.sigma, place.held()),
+            self.blend(&self.sigma, place.clamped()),
         )
     }
 
     /// The noise from slopes at column `x`, row `y`, along x and along y.
     pub fn slope_sigma_at(&self, x: f32, y: f32) -> [f32; 2] {
-        let place = self.place(x, y).held();
+        let place = self.place(x, y).clamped();
         self.slope_sigma
             .each_ref()
             .map(|map| self.blend(map, place))

@@ -93,7 +93,7 @@ impl FilteredFrame {
             worker.band.prepare(view.width, kernel);
         }
         let total = AtomicUsize::new(0);
-        CellRows::of(mesh, maxima, candidates).share(workers, &|worker, row| {
+        CellRows::new(mesh, maxima, candidates).distribute(workers, &|worker, row| {
             if view.is_interrupted() {
                 return;
             }

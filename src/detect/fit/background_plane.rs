@@ -126,10 +126,10 @@ fn plane_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
 /// The same, with the coefficients of x², xy and y² where a plane is not enough.
 fn surface_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
     /// The gain in χ² over a plane that they need.
-    const LEAST_GAIN: f64 = 25.0;
+    const MIN_GAIN: f64 = 25.0;
     let plane = plane_through(ring)?;
     let bent = fitted_surface::<6>(ring)
-        .filter(|(_, variance)| ring.len() as f64 * (plane.1 / variance - 1.0) > LEAST_GAIN);
+        .filter(|(_, variance)| ring.len() as f64 * (plane.1 / variance - 1.0) > MIN_GAIN);
     Some(bent.map_or(plane, |(surface, variance)| (surface.into(), variance)))
 }
 
@@ -140,7 +140,7 @@ fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>
     /// Pixels so many standard deviations off the surface of the round before are not its own.
     const CLIP_SIGMAS: f64 = 2.5;
     /// Share of the pixels that is left at least.
-    const MIN_SHARE: f64 = 0.4;
+    const MIN_FRACTION: f64 = 0.4;
     let first = f64::from(ring.first()?.value);
     let mut found: Option<(SVector<f64, N>, f64)> = None;
     for _ in 0..ROUNDS {
@@ -160,7 +160,7 @@ fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>
             squares += value * value;
             used += 1.0;
         }
-        if used < (MIN_SHARE * ring.len() as f64).max(N as f64 + 1.0) {
+        if used < (MIN_FRACTION * ring.len() as f64).max(N as f64 + 1.0) {
             return None;
         }
         let surface = fit.solve()?;

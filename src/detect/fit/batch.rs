@@ -17,7 +17,7 @@ use multiversion::multiversion;
 /// Stars fitted at the same time.
 const BATCH: usize = 16;
 /// Most lobes of a spot that is fitted in a batch.
-pub(crate) const MAX_BATCH_LOBES: usize = 8;
+pub(crate) const MAX_BATCH_COMPONENTS: usize = 8;
 /// A value for each of them.
 type PerStar = [f32; BATCH];
 /// A profile of each of them along an axis.
@@ -53,9 +53,9 @@ pub(crate) struct BatchFitter {
     /// Row by row: the pixels above the background map, in units of the noise; NaN where left out.
     data: Vec<PerStar>,
     /// Lobes of the spot with most of them; 1 where all are single Gaussians.
-    lobes: usize,
+    components: usize,
     /// Profiles of the first lobe of each spot along x and y, of the second, …
-    axes: [Axes; MAX_BATCH_LOBES],
+    axes: [Axes; MAX_BATCH_COMPONENTS],
 }
 
 /// Profiles of a lobe of each spot along x and y.
@@ -64,7 +64,7 @@ struct Axes {
     across: Vec<ProfilePart<PerStar>>,
     down: Vec<ProfilePart<PerStar>>,
     /// Shares of the light.
-    share: PerStar,
+    weight: PerStar,
 }
 
 /// The model of a pixel, in units of the noise.
@@ -124,11 +124,11 @@ impl BatchFitter {
         while self.lanes.iter().any(Option::is_some) {
             self.fill_axes();
             let (data, model) = (&self.data, self.model(config));
-            let sums = match self.lobes {
+            let sums = match self.components {
                 1 => sums_over::<1>(data, &self.axes, &model),
                 2 => sums_over::<2>(data, &self.axes, &model),
                 3 | 4 => sums_over::<4>(data, &self.axes, &model),
-                _ => sums_over::<MAX_BATCH_LOBES>(data, &self.axes, &model),
+                _ => sums_over::<MAX_BATCH_COMPONENTS>(data, &self.axes, &model),
             };
             for lane in 0..BATCH {
                 let Some(ActiveFit { start, steps }) = self.lanes[lane] else {
@@ -194,25 +194,25 @@ impl BatchFitter {
     fn fill_axes(&mut self) {
         let active = self.windows.iter().zip(&self.lanes);
         let active = active.filter(|(_, lane)| lane.is_some());
-        let counts = active.map(|(window, _)| window.psf.lobes.len());
-        self.lobes = counts.max().unwrap_or(0).clamp(1, MAX_BATCH_LOBES);
+        let counts = active.map(|(window, _)| window.psf.components.len());
+        self.components = counts.max().unwrap_or(0).clamp(1, MAX_BATCH_COMPONENTS);
         for (number, axes) in self.axes.iter_mut().enumerate() {
             // As many as are summed over.
-            if number >= self.lobes.next_power_of_two() {
+            if number >= self.components.next_power_of_two() {
                 break;
             }
             let mut centers_px = [[0.0f64; BATCH]; 2];
             let mut cumulative = [Cumulative::of_spot(1.0); BATCH];
-            axes.share = [0.0; BATCH];
+            axes.weight = [0.0; BATCH];
             for (lane, (fit, window)) in self.fits.iter().zip(&self.windows).enumerate() {
                 let Some(spot) = fit.spots.first() else {
                     continue;
                 };
-                let lobe = window.psf.lobes.get(number);
+                let lobe = window.psf.components.get(number);
                 let is_single = window.psf.is_gaussian() && number == 0;
                 let [dx, dy] = lobe.map_or([0.0; 2], |lobe| lobe.offset_px);
                 let share = lobe.map_or(0.0, |lobe| lobe.share);
-                axes.share[lane] = if is_single { 1.0 } else { share as f32 };
+                axes.weight[lane] = if is_single { 1.0 } else { share as f32 };
                 centers_px[0][lane] = spot.x - window.x0 as f64 + dx;
                 centers_px[1][lane] = spot.y - window.y0 as f64 + dy;
                 let sigma_px = lobe.map_or(fit.spot_px, |lobe| lobe.sigma_px);
@@ -314,9 +314,9 @@ fn fill(
 
 /// Sums over the pixels of all stars.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn sums_over<const LOBES: usize>(
+fn sums_over<const COMPONENTS: usize>(
     data: &[PerStar],
-    lobes: &[Axes; MAX_BATCH_LOBES],
+    lobes: &[Axes; MAX_BATCH_COMPONENTS],
     model: &BatchModel,
 ) -> BatchSums {
     let mut matrix = [[[0.0f32; BATCH]; ONE_SPOT]; ONE_SPOT];
@@ -324,16 +324,17 @@ fn sums_over<const LOBES: usize>(
     let [mut chi2, mut pixels] = [[0.0f32; BATCH]; 2];
     let mut shapes = [[0.0f32; BATCH]; 3];
     let side = lobes[0].across.len();
-    let shares: [PerStar; LOBES] = std::array::from_fn(|i| lobes[i].share);
-    let across: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].across[..side]);
-    let down: [Profile; LOBES] = std::array::from_fn(|i| &lobes[i].down[..side]);
+    let shares: [PerStar; COMPONENTS] = std::array::from_fn(|i| lobes[i].weight);
+    let across: [Profile; COMPONENTS] = std::array::from_fn(|i| &lobes[i].across[..side]);
+    let down: [Profile; COMPONENTS] = std::array::from_fn(|i| &lobes[i].down[..side]);
     let model = *model;
     for (y, row) in data.chunks_exact(side.max(1)).enumerate().take(side) {
         // Copied so that the compiler need not assume aliasing.
-        let downs: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| down[i][y]);
+        let downs: [ProfilePart<PerStar>; COMPONENTS] = std::array::from_fn(|i| down[i][y]);
         for (x, data) in row.iter().enumerate() {
             let data = *data;
-            let acrosses: [ProfilePart<PerStar>; LOBES] = std::array::from_fn(|i| across[i][x]);
+            let acrosses: [ProfilePart<PerStar>; COMPONENTS] =
+                std::array::from_fn(|i| across[i][x]);
             let mut gradient = [[1.0f32; BATCH]; ONE_SPOT];
             let [mut weight, mut residual] = [[0.0f32; BATCH]; 2];
             for lane in 0..BATCH {
@@ -341,7 +342,7 @@ fn sums_over<const LOBES: usize>(
                 let mut parts = [0.0f32; 4];
                 for ((across, down), share) in acrosses.iter().zip(&downs).zip(&shares) {
                     let of_lobe = spot_gradient(flux, &across.lane(lane), &down.lane(lane));
-                    if LOBES == 1 {
+                    if COMPONENTS == 1 {
                         parts = of_lobe;
                     } else {
                         for (part, of_lobe) in parts.iter_mut().zip(of_lobe) {

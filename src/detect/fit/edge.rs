@@ -155,21 +155,21 @@ impl RingProfile {
     /// Where a step parts the pixels better than a slope does; `None` where it does not, or is so near the
     /// middle that a star there cannot be told from it.
     fn edge(&self, noise_adu: f64) -> Option<f64> {
-        const LEAST_DISTANCE_PX: f64 = 2.0;
+        const MIN_DISTANCE_PX: f64 = 2.0;
         /// The gain in χ² that a step needs.
-        const LEAST_GAIN: f64 = 25.0;
+        const MIN_GAIN: f64 = 25.0;
         /// The height that it needs, in noises of a pixel: lower ones move no stars.
-        const LEAST_NOISES: f64 = 3.0;
+        const MIN_NOISES: f64 = 3.0;
         /// The same in standard deviations of pixels next to each other: the rest is faint stars.
-        const LEAST_SIGMAS: f64 = 2.0;
+        const MIN_SIGMAS: f64 = 2.0;
         let of_slope = self.without_step()?;
         let places = self.bins.iter().map(|bin| bin.place - 0.5);
-        let places = places.filter(|place| place.abs() >= LEAST_DISTANCE_PX);
+        let places = places.filter(|place| place.abs() >= MIN_DISTANCE_PX);
         let steps = places.filter_map(|place| Some((place, self.with_step(place)?)));
         let (place, step) = steps.min_by(|a, b| a.1.misfit.total_cmp(&b.1.misfit))?;
         let variance = self.variance();
-        let is_clear = of_slope - step.misfit > LEAST_GAIN * variance;
-        let least_height = (LEAST_NOISES * noise_adu).max(LEAST_SIGMAS * variance.sqrt());
+        let is_clear = of_slope - step.misfit > MIN_GAIN * variance;
+        let least_height = (MIN_NOISES * noise_adu).max(MIN_SIGMAS * variance.sqrt());
         let is_high = step.height.abs() > least_height;
         (is_clear && is_high).then_some(place)
     }

@@ -16,7 +16,7 @@ pub(crate) trait SpotLight: Copy {
     fn in_group(&self, group: usize, row: usize) -> Self::Group;
 
     /// The fraction of the light in each pixel of a group.
-    fn shares(&self, group: usize, row: usize) -> PixelGroup;
+    fn fractions(&self, group: usize, row: usize) -> PixelGroup;
 }
 
 /// The light of a spot in a group of pixels of a row.
@@ -68,7 +68,7 @@ impl SpotLight for GaussianLight<'_> {
     }
 
     #[inline(always)]
-    fn shares(&self, group: usize, row: usize) -> PixelGroup {
+    fn fractions(&self, group: usize, row: usize) -> PixelGroup {
         let [across, down] = self.axes;
         let down = down.pixel(row).value;
         each(&across.group(group).value, |share| share * down)
@@ -131,7 +131,7 @@ pub(crate) fn add_light<L: SpotLight>(spot: &L, sign: f32, groups: usize, data: 
     let flux = sign * spot.flux();
     for group in 0..groups {
         for (row, pixels) in data.iter_mut().skip(group).step_by(groups).enumerate() {
-            let light = each(&spot.shares(group, row), |share| flux * share);
+            let light = each(&spot.fractions(group, row), |share| flux * share);
             *pixels = plus(pixels, &light);
         }
     }

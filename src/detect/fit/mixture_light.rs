@@ -42,7 +42,7 @@ impl MixtureImage {
                 scale,
                 size,
             };
-            draw_lobes::<PARTS>(psf, &window, &mut self.profiles, &mut self.groups);
+            draw_components::<PARTS>(psf, &window, &mut self.profiles, &mut self.groups);
         } else {
             let sizes = [psf.spot_px, scale];
             psf.table
@@ -54,7 +54,7 @@ impl MixtureImage {
     pub fn light(&self, flux: f32, groups: usize) -> MixtureLight<'_> {
         MixtureLight {
             flux,
-            shares: &self.groups,
+            fractions: &self.groups,
             groups,
         }
     }
@@ -73,7 +73,7 @@ struct DrawnSpot {
 
 /// Adds the lobes of a PSF to the pixels of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_lobes<const PARTS: usize>(
+fn draw_components<const PARTS: usize>(
     psf: &LocalPsf,
     window: &DrawnSpot,
     profiles: &mut NarrowProfiles,
@@ -85,13 +85,13 @@ fn draw_lobes<const PARTS: usize>(
         size,
     } = *window;
     let width = size.width.div_ceil(GROUP_PX);
-    for lobe in &psf.lobes {
+    for lobe in &psf.components {
         let [dx, dy] = lobe.offset_px;
         let place = [x_px + scale * dx, y_px + scale * dy];
         let part = profiles.fill(place, scale * lobe.sigma_px, size);
         // What a larger spot moves, and widens, its lobes by.
         let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
-        add_lobe::<PARTS>(lobe.share as f32, by_spot, profiles, part, into, width);
+        add_component::<PARTS>(lobe.share as f32, by_spot, profiles, part, into, width);
     }
 }
 
@@ -101,7 +101,7 @@ fn draw_lobes<const PARTS: usize>(
     reason = "lanes of several arrays read best as indices"
 )]
 #[inline(always)]
-fn add_lobe<const PARTS: usize>(
+fn add_component<const PARTS: usize>(
     share: f32,
     by_spot: [f32; 3],
     profiles: &NarrowProfiles,
@@ -146,7 +146,7 @@ fn add_lobe<const PARTS: usize>(
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MixtureLight<'a> {
     flux: f32,
-    shares: &'a [ShareGroup],
+    fractions: &'a [ShareGroup],
     /// Groups in a row.
     groups: usize,
 }
@@ -155,7 +155,7 @@ pub(crate) struct MixtureLight<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MixtureGroup {
     flux: f32,
-    shares: ShareGroup,
+    fractions: ShareGroup,
 }
 
 impl SpotLight for MixtureLight<'_> {
@@ -170,13 +170,13 @@ impl SpotLight for MixtureLight<'_> {
     fn in_group(&self, group: usize, row: usize) -> MixtureGroup {
         MixtureGroup {
             flux: self.flux,
-            shares: self.shares[row * self.groups + group],
+            fractions: self.fractions[row * self.groups + group],
         }
     }
 
     #[inline(always)]
-    fn shares(&self, group: usize, row: usize) -> PixelGroup {
-        self.shares[row * self.groups + group][0]
+    fn fractions(&self, group: usize, row: usize) -> PixelGroup {
+        self.fractions[row * self.groups + group][0]
     }
 }
 
@@ -188,13 +188,13 @@ impl GroupLight for MixtureGroup {
 
     #[inline(always)]
     fn gradient(&self, lane: usize) -> [f32; 4] {
-        let by = |number: usize| self.flux * self.shares[number][lane];
-        [self.shares[0][lane], by(1), by(2), by(3)]
+        let by = |number: usize| self.flux * self.fractions[number][lane];
+        [self.fractions[0][lane], by(1), by(2), by(3)]
     }
 
     #[inline(always)]
     fn gradients(&self) -> [PixelGroup; 4] {
-        let [shape, by_x, by_y, by_size] = &self.shares;
+        let [shape, by_x, by_y, by_size] = &self.fractions;
         let scaled = |by: &PixelGroup| each(by, |by| self.flux * by);
         [*shape, scaled(by_x), scaled(by_y), scaled(by_size)]
     }

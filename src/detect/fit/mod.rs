@@ -26,7 +26,7 @@ mod parameters;
 mod sums;
 mod window;
 
-pub(crate) use batch::{BatchStart, MAX_BATCH_LOBES};
+pub(crate) use batch::{BatchStart, MAX_BATCH_COMPONENTS};
 pub(crate) use buffers::FitBuffers;
 pub(crate) use fitter::AnyLight;
 pub(crate) use frame_maps::FrameMaps;

@@ -334,7 +334,7 @@ pub(crate) fn flux_variance<L: SpotLight>(
     let mut sums = [[0.0f32; GROUP_PX]; 3];
     for group in 0..pixels.groups {
         for (row, data) in pixels.column_of_groups(group).enumerate() {
-            let shares = spot.shares(group, row);
+            let shares = spot.fractions(group, row);
             for lane in 0..GROUP_PX {
                 let shape = shares[lane];
                 let variance = pixels.variance(spot.flux() * shape);

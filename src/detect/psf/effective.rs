@@ -30,7 +30,7 @@ pub(crate) struct FieldComponent {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct LocalPsf {
     /// Empty where it is tabulated, and for a single Gaussian of the size that is fitted.
-    pub lobes: Vec<GaussianComponent>,
+    pub components: Vec<GaussianComponent>,
     /// The size, as [`Fit::spot_px`](crate::detect::fit::Fit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
@@ -41,7 +41,7 @@ pub(crate) struct LocalPsf {
 impl LocalPsf {
     /// Becomes a copy of another spot, without a new allocation where it fits.
     pub fn copy_from(&mut self, other: &Self) {
-        self.lobes.clone_from(&other.lobes);
+        self.components.clone_from(&other.components);
         self.spot_px = other.spot_px;
         self.table.copy_from(&other.table);
     }
@@ -49,22 +49,22 @@ impl LocalPsf {
     /// Tabulates the lobes, unless they are too sharp.
     pub fn tabulate(&mut self) {
         let mut extent = ComponentExtent::default();
-        extent.add(&self.lobes);
+        extent.add(&self.components);
         match extent.layout() {
-            Some(layout) => self.table.fill(&self.lobes, layout),
+            Some(layout) => self.table.fill(&self.components, layout),
             None => self.table.clear(),
         }
     }
 
     /// Becomes a single Gaussian.
     pub fn clear(&mut self) {
-        self.lobes.clear();
+        self.components.clear();
         self.table.clear();
     }
 
     /// Whether it is a single Gaussian.
     pub fn is_gaussian(&self) -> bool {
-        self.lobes.is_empty() && self.table.is_empty()
+        self.components.is_empty() && self.table.is_empty()
     }
 }
 
@@ -77,7 +77,7 @@ pub(crate) struct FieldFrame {
 
 impl FieldFrame {
     /// Of a frame of this size.
-    pub fn of(size: Size) -> Self {
+    pub fn new(size: Size) -> Self {
         let [width, height] = size.sides().map(|side| side as f64);
         Self {
             centre_px: [0.5 * (width - 1.0), 0.5 * (height - 1.0)],
@@ -159,7 +159,7 @@ pub(crate) enum FieldForm {
 pub(crate) struct EffectivePsf {
     /// Of a spot of the typical moments; for [`FieldForm::Radial`], of a star to the right of the
     /// centre.
-    pub lobes: Vec<FieldComponent>,
+    pub components: Vec<FieldComponent>,
     /// How they change over the field.
     pub form: FieldForm,
     /// Moments that the lobes have as they are.
@@ -185,7 +185,7 @@ impl EffectivePsf {
             corner_share: 1.0,
         };
         Self {
-            lobes: vec![lobe],
+            components: vec![lobe],
             form: FieldForm::Symmetric,
             typical: [libm::log(spot_px), 0.0, 0.0],
             moments,
@@ -224,8 +224,8 @@ impl EffectivePsf {
 
     /// The spot at a pixel, its centre of light at its place.
     pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
-        self.place_lobes(x_px, y_px, local);
-        let lobes = &mut local.lobes;
+        self.place_components(x_px, y_px, local);
+        let lobes = &mut local.components;
         let sum: f64 = lobes.iter().map(|lobe| lobe.share).sum();
         for axis in 0..2 {
             let moments = lobes.iter().map(|lobe| lobe.share * lobe.offset_px[axis]);
@@ -240,7 +240,7 @@ impl EffectivePsf {
     }
 
     /// The lobes at a pixel, about the point that their offsets refer to.
-    pub fn place_lobes(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
+    pub fn place_components(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
         let here = self.moments.at(x_px, y_px);
         let mut stretch = product(root(here), inverse_root(self.typical));
         let mut outward = 0.0;
@@ -255,19 +255,21 @@ impl EffectivePsf {
             stretch = product(stretch, [[cos, -sin], [sin, cos]]);
         }
         let scale = libm::exp(here[0] - self.typical[0]);
-        local.lobes.clear();
-        local.lobes.extend(self.lobes.iter().map(|of_field| {
-            let GaussianComponent {
-                offset_px: [x, y],
-                sigma_px,
-                share,
-            } = of_field.lobe;
-            GaussianComponent {
-                offset_px: stretch.map(|[a, b]| a * x + b * y),
-                sigma_px: scale * sigma_px,
-                share: share + outward * (of_field.corner_share - share),
-            }
-        }));
+        local.components.clear();
+        local
+            .components
+            .extend(self.components.iter().map(|of_field| {
+                let GaussianComponent {
+                    offset_px: [x, y],
+                    sigma_px,
+                    share,
+                } = of_field.lobe;
+                GaussianComponent {
+                    offset_px: stretch.map(|[a, b]| a * x + b * y),
+                    sigma_px: scale * sigma_px,
+                    share: share + outward * (of_field.corner_share - share),
+                }
+            }));
         local.spot_px = self.spot_px;
     }
 
@@ -351,7 +353,7 @@ mod tests {
 
     #[test]
     fn the_lobes_are_stretched_to_the_moments_of_the_place() {
-        let frame = FieldFrame::of(Size::new(101, 101));
+        let frame = FieldFrame::new(Size::new(101, 101));
         let mut moments = FieldMoments::constant(frame, [0.0; 3]);
         moments.range = [[-1.0, 1.0]; 3];
         // Wider and elongated along x to the right.
@@ -367,7 +369,7 @@ mod tests {
             corner_share: 0.25,
         };
         let psf = EffectivePsf {
-            lobes: offsets.map(lobe).to_vec(),
+            components: offsets.map(lobe).to_vec(),
             form: FieldForm::Fixed,
             typical: [0.0; 3],
             moments,
@@ -377,13 +379,13 @@ mod tests {
         let mut local = LocalPsf::default();
         psf.at(50.0, 50.0, &mut local);
         assert_eq!(
-            local.lobes,
-            psf.lobes.iter().map(|l| l.lobe).collect::<Vec<_>>()
+            local.components,
+            psf.components.iter().map(|l| l.lobe).collect::<Vec<_>>()
         );
         psf.at(100.0, 50.0, &mut local);
         let moment = |i: usize| {
             local
-                .lobes
+                .components
                 .iter()
                 .map(|l| l.share * l.offset_px[i].powi(2))
                 .sum::<f64>()

@@ -66,10 +66,10 @@ impl<'a> FieldTables<'a> {
         };
         if self.nodes.is_empty() {
             self.psf.at(x_px, y_px, local);
-            local.table.fill(&local.lobes, layout);
+            local.table.fill(&local.components, layout);
             return;
         }
-        local.lobes.clear();
+        local.components.clear();
         local.spot_px = self.psf.spot_px;
         let table = &mut local.table;
         table.layout = layout;
@@ -109,15 +109,15 @@ impl<'a> FieldTables<'a> {
     fn node(&self, [column, row]: [usize; 2], layout: TableLayout) -> &PsfTable {
         self.nodes[row * (self.cells[0] + 1) + column].get_or_init(|| {
             let mut local = LocalPsf::default();
-            self.lobes_at([column, row], &mut local);
+            self.components_at([column, row], &mut local);
             let mut table = PsfTable::default();
-            table.fill(&local.lobes, layout);
+            table.fill(&local.components, layout);
             table
         })
     }
 
     /// The lobes at a node.
-    fn lobes_at(&self, node: [usize; 2], local: &mut LocalPsf) {
+    fn components_at(&self, node: [usize; 2], local: &mut LocalPsf) {
         let [x, y] = [0, 1].map(|axis| node[axis] as f64 * self.cell_px[axis]);
         self.psf.at(x, y, local);
     }
@@ -128,8 +128,8 @@ impl<'a> FieldTables<'a> {
         let mut extent = ComponentExtent::default();
         for row in 0..self.cells[1] + 1 {
             for column in 0..self.cells[0] + 1 {
-                self.lobes_at([column, row], &mut local);
-                extent.add(&local.lobes);
+                self.components_at([column, row], &mut local);
+                extent.add(&local.components);
             }
         }
         extent.layout()
@@ -169,14 +169,14 @@ fn mix(parts: [(&[f32], f32); 4], into: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::tests::lobes;
+    use super::super::table::tests::components;
     use super::*;
     use crate::detect::psf::{FieldComponent, FieldFrame, FieldMoments, GaussianComponent};
 
     #[test]
     fn tables_between_nodes_agree_with_the_spot_there() {
         let size = Size::new(1200, 900);
-        let mut moments = FieldMoments::constant(FieldFrame::of(size), [0.0; 3]);
+        let mut moments = FieldMoments::constant(FieldFrame::new(size), [0.0; 3]);
         // Twice as wide in the corners, and elongated.
         moments.coefficients[0][3] = 0.69;
         moments.coefficients[0][5] = 0.69;
@@ -187,7 +187,7 @@ mod tests {
             corner_share: lobe.share,
         };
         let psf = EffectivePsf {
-            lobes: lobes(0.6).into_iter().map(lobe).collect(),
+            components: components(0.6).into_iter().map(lobe).collect(),
             form: FieldForm::Fixed,
             typical: [0.0; 3],
             moments,

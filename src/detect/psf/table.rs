@@ -64,9 +64,9 @@ impl ComponentExtent {
     /// The layout that suits the lobes; `None` where they are too sharp for a table.
     pub fn layout(&self) -> Option<TableLayout> {
         /// Of sharper lobes, in pixels, the derivative by the size is not known well enough.
-        const MIN_LOBE_PX: f64 = 0.4;
-        let is_sharp = self.least_px < MIN_LOBE_PX;
-        (!is_sharp).then(|| TableLayout::of(self.least_px, self.reach_px))
+        const MIN_COMPONENT_PX: f64 = 0.4;
+        let is_sharp = self.least_px < MIN_COMPONENT_PX;
+        (!is_sharp).then(|| TableLayout::new(self.least_px, self.reach_px))
     }
 }
 
@@ -105,7 +105,7 @@ impl PsfTable {
             for (profile, offset_px) in profiles.iter_mut().zip(lobe.offset_px) {
                 profile.fill(layout, offset_px, lobe.sigma_px);
             }
-            add_lobe_samples(layout, &profiles, lobe.share as f32, &mut self.coefficients);
+            add_component_samples(layout, &profiles, lobe.share as f32, &mut self.coefficients);
         }
     }
 
@@ -206,7 +206,7 @@ fn draw_rows<const PARTS: usize, const IS_SCALED: bool>(
                     combine_samples::<PARTS>(&table.coefficients, across.at(start), down.at(row));
             }
             let dx = start as f32 - window.centre_px[0];
-            *into = shares_of::<PARTS, IS_SCALED>(parts, [dx, dy], window);
+            *into = fractions_of::<PARTS, IS_SCALED>(parts, [dx, dy], window);
         }
     }
 }
@@ -322,7 +322,7 @@ fn combine_columns<const PARTS: usize>(
 /// the pixels, which are not scaled, the light F changes by `−2F − r·∇F − ∇²F/12`, to the second
 /// order in the width of the pixels.
 #[inline(always)]
-fn shares_of<const PARTS: usize, const IS_SCALED: bool>(
+fn fractions_of<const PARTS: usize, const IS_SCALED: bool>(
     parts: [PixelGroup; 5],
     from_centre: [f32; 2],
     window: &Drawn,
@@ -430,7 +430,7 @@ fn filter(edges: &[f32], per_px: usize, weights: &[f32; 5], into: &mut [f32]) {
     reason = "rows of several arrays read best as indices"
 )]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_lobe_samples(
+fn add_component_samples(
     layout: TableLayout,
     profiles: &[SplineProfile; 2],
     share: f32,
@@ -471,7 +471,7 @@ pub(super) mod tests {
     const MAX_ERRORS_SCALED: [f32; 4] = [3e-2, 0.2, 0.2, 0.3];
 
     /// A lopsided spot of lobes of this size.
-    pub fn lobes(sigma_px: f64) -> Vec<GaussianComponent> {
+    pub fn components(sigma_px: f64) -> Vec<GaussianComponent> {
         let offsets = [[-1.2, 0.1], [0.3, -0.6], [0.5, 0.4]];
         let shares = [0.25, 0.35, 0.4];
         let lobe = |(offset, share): ([f64; 2], f64)| GaussianComponent {
@@ -479,17 +479,20 @@ pub(super) mod tests {
             sigma_px,
             share,
         };
-        let mut lobes: Vec<GaussianComponent> = offsets.into_iter().zip(shares).map(lobe).collect();
+        let mut components: Vec<GaussianComponent> =
+            offsets.into_iter().zip(shares).map(lobe).collect();
         for axis in 0..2 {
-            let centre: f64 = lobes.iter().map(|l| l.share * l.offset_px[axis]).sum();
-            lobes.iter_mut().for_each(|l| l.offset_px[axis] -= centre);
+            let centre: f64 = components.iter().map(|l| l.share * l.offset_px[axis]).sum();
+            components
+                .iter_mut()
+                .for_each(|l| l.offset_px[axis] -= centre);
         }
-        lobes
+        components
     }
 
     /// The light and its derivatives in a pixel of a window of this side, from the lobes.
     fn expected(
-        lobes: &[GaussianComponent],
+        components: &[GaussianComponent],
         scale: f64,
         place: [f64; 2],
         side: usize,
@@ -497,7 +500,7 @@ pub(super) mod tests {
     ) -> [f64; 4] {
         let mut profiles = NarrowProfiles::default();
         let mut sums = [0.0; 4];
-        for lobe in lobes {
+        for lobe in components {
             let at = [0, 1].map(|axis| place[axis] + lobe.offset_px[axis]);
             let part = profiles.fill(at, lobe.sigma_px, Size::new(side, side));
             let group = x / GROUP_PX;
@@ -544,11 +547,11 @@ pub(super) mod tests {
     /// these errors over the brightest pixel.
     fn assert_agreement(sigma_px: f64, scale: f64, most: [f32; 4]) {
         const SIDE: usize = 21;
-        let lobes = lobes(sigma_px);
+        let lobes = components(sigma_px);
         let mut table = PsfTable::default();
         table.fill(
             &lobes,
-            TableLayout::of(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
+            TableLayout::new(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
         );
         let scaled = |lobe: &GaussianComponent| GaussianComponent {
             offset_px: lobe.offset_px.map(|at| scale * at),

@@ -20,7 +20,7 @@ pub(super) struct TableLayout {
 
 impl TableLayout {
     /// For lobes of this size that reach this far from the centre, in pixels.
-    pub fn of(sigma_px: f64, reach_px: f64) -> Self {
+    pub fn new(sigma_px: f64, reach_px: f64) -> Self {
         /// Largest distance of the samples over the width of a lobe, pixel included: the error of
         /// the interpolation is then below two thousandths of the lobe's peak.
         const MAX_STEP: f64 = 0.5;
@@ -68,7 +68,7 @@ impl Taps {
     /// For a pixel at a distance from the centre of a spot that is `scale` times that of the table;
     /// `steps` are those of [`AxisTaps::fill`].
     #[inline(always)]
-    fn of(layout: TableLayout, steps: [usize; 2], distance_px: f64, scale: f64) -> Self {
+    fn compute(layout: TableLayout, steps: [usize; 2], distance_px: f64, scale: f64) -> Self {
         // Farther away there is no light.
         let far_px = (layout.side + MAX_WINDOW_PX) as f64;
         let per_px = layout.per_px as f64;
@@ -146,7 +146,7 @@ impl AxisTaps {
         for pixel in 0..different {
             let distance_px = pixel as f64 - at_px;
             self.pixels
-                .push(Taps::of(layout, steps, distance_px, scale));
+                .push(Taps::compute(layout, steps, distance_px, scale));
         }
         self.step = steps[1] as isize;
         // The samples of the others are not all in the table.

@@ -15,7 +15,7 @@ const EDGE_CELLS: isize = 3;
 /// Least change across a sharp edge, over the brightness of the brighter side.
 const MIN_CONTRAST: f32 = 0.25;
 /// Share of the range of levels, below which the brightness of the brighter side counts as that.
-const MIN_SHARE: f32 = 0.5;
+const MIN_FRACTION: f32 = 0.5;
 /// Largest density of stars in a hidden area, over that in the rest of the frame.
 const MAX_STARS: f64 = 0.2;
 /// Least number of stars that a sky of this size should show for their absence to count.
@@ -129,7 +129,7 @@ fn measure(
                 let dark = levels.adu[at(-1).unwrap_or(cell)];
                 let bright = levels.adu[outer];
                 // What is hardly brighter than the darkest cell has no edge, either.
-                let least = MIN_SHARE * (highest_adu - darkest_adu);
+                let least = MIN_FRACTION * (highest_adu - darkest_adu);
                 let scale = (bright - darkest_adu).max(least).max(f32::MIN_POSITIVE);
                 region.contrasts.push((bright - dark) / scale);
             }

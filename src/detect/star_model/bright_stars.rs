@@ -100,7 +100,7 @@ impl BrightPeak for RawPeak {
     }
 
     fn contrast(&self, maps: &FrameMaps<'_>) -> Contrast {
-        Contrast::of(&maps.view, maps.background, self.x, self.y)
+        Contrast::measure(&maps.view, maps.background, self.x, self.y)
     }
 
     fn size_px(&self, maps: &FrameMaps<'_>) -> f64 {

@@ -5,8 +5,8 @@
 //! 3. The residuals of the stars of that size give the noise model (`noise_model`).
 
 mod bright_stars;
-mod departure;
 mod noise_model;
+mod non_gaussian;
 mod spot_size;
 
 pub(crate) use bright_stars::{fit_bright_stars, isolated_peaks};

@@ -4,7 +4,7 @@
 //! squared residuals.
 
 use super::bright_stars::MAX_MODEL_ERROR;
-use super::departure::{CommonElongation, is_departure};
+use super::non_gaussian::{CommonElongation, are_non_gaussian};
 use super::spot_size::{BrightStars, MAX_STARS, MODE_WIDTH, weighted_size};
 use crate::base::least_squares::solve_pair;
 use crate::detect::fit::{
@@ -38,7 +38,7 @@ pub(crate) struct StarModel {
     /// How the noise grows with light.
     pub noise: NoiseModel,
     /// Whether the stars may be no round Gaussians of one size.
-    pub is_departure: bool,
+    pub is_non_gaussian: bool,
 }
 
 /// The noise model from the residuals of stars of about the frame's spot size, and their mean size
@@ -57,7 +57,7 @@ pub(crate) fn star_model(
         shot_adu: brightest.map_or(0.0, |spot| maps.noise_at(spot.x, spot.y)),
         model_error2: 0.0,
     };
-    let mut elongation = CommonElongation::of(maps.view.size());
+    let mut elongation = CommonElongation::new(maps.view.size());
     // Each round weights the squared residuals by the variance from the round before.
     for round in 1..=NOISE_ROUNDS {
         let mut sums = NoiseSums::default();
@@ -90,7 +90,7 @@ pub(crate) fn star_model(
     StarModel {
         spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),
         noise: model,
-        is_departure: is_departure(&elongation, &model, &of_all_sizes, maps.spot_px),
+        is_non_gaussian: are_non_gaussian(&elongation, &model, &of_all_sizes, maps.spot_px),
     }
 }
 

@@ -38,7 +38,7 @@ impl SpotModel {
     }
 
     /// Fraction of the light of a star that does not move on its brightest pixel, at most.
-    pub fn peak_share(&self) -> f64 {
+    pub fn peak_fraction(&self) -> f64 {
         let half = 0.5 / (std::f64::consts::SQRT_2 * self.spot_sigma_px);
         libm::erf(half).powi(2)
     }

@@ -6,8 +6,8 @@ use super::square::{Square, nearest};
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median;
 use crate::detect::fit::{
-    BatchStart, FitBuffers, FitConfig, MAX_BATCH_LOBES, NoiseModel, SpotEstimate, SpotFit, Window,
-    window_radius,
+    BatchStart, FitBuffers, FitConfig, MAX_BATCH_COMPONENTS, NoiseModel, SpotEstimate, SpotFit,
+    Window, window_radius,
 };
 use crate::detect::psf::{GaussianComponent, LocalPsf, PIXEL_VARIANCE_PX2};
 use crate::detect::star_model::{BrightStars, MAX_STARS, noise_of, spot_size, weighted_size};
@@ -17,7 +17,7 @@ use arrayvec::ArrayVec;
 /// Pixels between the window of a fit and the end of a square: the ring of the background.
 const RING_PX: usize = 2;
 /// Share of a star's variance from which on its smear is not round, and has a spot of its own.
-const MIN_SMEAR_SHARE: f64 = 0.05;
+const MIN_SMEAR_FRACTION: f64 = 0.05;
 /// Longest part of a path that two Gaussians stand for, in standard deviations of the spot.
 const PART_SIGMAS: f64 = 2.0;
 /// Most parts of a path.
@@ -112,9 +112,9 @@ impl WindowDetector {
         self.find_peaks(model, expected);
         let longest = expected
             .iter()
-            .map(|star| lobes_of(model, star.smear_px))
+            .map(|star| components_of(model, star.smear_px))
             .max();
-        if longest.unwrap_or(0) <= MAX_BATCH_LOBES {
+        if longest.unwrap_or(0) <= MAX_BATCH_COMPONENTS {
             self.fit_together(model, saturation_adu, expected, found);
         } else {
             self.fit_one_by_one(model, saturation_adu, expected, found);
@@ -340,7 +340,7 @@ impl WindowDetector {
         };
         let mut sizes = BrightStars::new();
         let cut = |start: &BatchStart, window: &mut Window| {
-            window.psf.lobes.clear();
+            window.psf.components.clear();
             cut_out(squares, pixels, start, saturation_adu, window);
         };
         let starts = starts.iter().copied();
@@ -368,9 +368,9 @@ fn filter_size_px(spot_px: f64) -> f64 {
 }
 
 /// Number of Gaussians along the path of a star; 0 where its spot is round.
-fn lobes_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
+fn components_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
     let width2 = model.spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2;
-    if 2.0 * smear_variance_px2(smear_px) <= MIN_SMEAR_SHARE * width2 {
+    if 2.0 * smear_variance_px2(smear_px) <= MIN_SMEAR_FRACTION * width2 {
         return 0;
     }
     let length_px = libm::hypot(smear_px[0], smear_px[1]);
@@ -382,13 +382,13 @@ fn lobes_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
 /// points in each part of the path.
 fn set_smear(model: &SpotModel, smear_px: [f64; 2], psf: &mut LocalPsf) {
     psf.spot_px = model.spot_sigma_px;
-    psf.lobes.clear();
-    let lobes = lobes_of(model, smear_px);
+    psf.components.clear();
+    let lobes = components_of(model, smear_px);
     for part in 0..lobes / 2 {
         for point in [-1.0, 1.0] {
             let within = 0.5 + 0.5 * point / 3f64.sqrt();
             let along = 2.0 * (part as f64 + within) / lobes as f64 - 0.5;
-            psf.lobes.push(GaussianComponent {
+            psf.components.push(GaussianComponent {
                 offset_px: smear_px.map(|path_px| along * path_px),
                 sigma_px: model.spot_sigma_px,
                 share: 1.0 / lobes as f64,

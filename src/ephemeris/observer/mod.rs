@@ -154,17 +154,17 @@ impl Site {
         // WGS 84.
         const EQUATORIAL_RADIUS_KM: f64 = 6_378.137;
         const FLATTENING: f64 = 1.0 / 298.257_223_563;
-        const POLAR_SHARE: f64 = (1.0 - FLATTENING) * (1.0 - FLATTENING);
+        const POLAR_FRACTION: f64 = (1.0 - FLATTENING) * (1.0 - FLATTENING);
         const ROTATION_RAD_S: f64 = 7.292_115e-5;
         let [north, _, up] = self.north_east_up();
         let sin_lat = up.z;
         let normal_km =
-            EQUATORIAL_RADIUS_KM / (1.0 - (1.0 - POLAR_SHARE) * sin_lat * sin_lat).sqrt();
+            EQUATORIAL_RADIUS_KM / (1.0 - (1.0 - POLAR_FRACTION) * sin_lat * sin_lat).sqrt();
         let height_km = self.height_m / 1000.0;
         let terrestrial_km = Vector3::new(
             (normal_km + height_km) * up.x,
             (normal_km + height_km) * up.y,
-            (normal_km * POLAR_SHARE + height_km) * up.z,
+            (normal_km * POLAR_FRACTION + height_km) * up.z,
         );
         let to_terrestrial = earth::icrs_to_terrestrial(years);
         let velocity_km_s = (ROTATION_RAD_S * Vector3::z()).cross(&terrestrial_km);

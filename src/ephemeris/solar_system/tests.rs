@@ -92,7 +92,7 @@ fn apart_arcsec(body: &Body, place: RaDec) -> f64 {
     body.direction.angle_to(&direction(place)) * ARCSEC_PER_RAD
 }
 
-fn of(kind: BodyKind, bodies: &[Body; 8]) -> Body {
+fn find(kind: BodyKind, bodies: &[Body; 8]) -> Body {
     *bodies.iter().find(|body| body.kind == kind).unwrap()
 }
 
@@ -134,7 +134,7 @@ fn places_are_those_that_horizons_prints() {
     let sexagesimal = |text: &str| Angle::parse(text).and_then(Angle::in_degrees).unwrap();
     for (kind, date, ra, dec) in HORIZONS {
         let place = [15.0 * sexagesimal(ra), sexagesimal(dec)];
-        let apart = apart_arcsec(&of(*kind, &at(date, None)), place);
+        let apart = apart_arcsec(&find(*kind, &at(date, None)), place);
         assert!(apart < PLANET_TOLERANCE_ARCSEC, "{kind:?}: {apart}");
     }
 }
@@ -148,7 +148,7 @@ fn what_is_not_known_of_the_time_is_stated() {
             for hours in [-error.days() * 24.0, 0.3, error.days() * 24.0] {
                 let mjd = 58_693.5 + hours / 24.0;
                 let then = ObservationDate::from_modified_julian_date(mjd).unwrap();
-                let moved = of(body.kind, &bodies_at(&then, TimeError::None, None));
+                let moved = find(body.kind, &bodies_at(&then, TimeError::None, None));
                 let apart_rad = moved.direction.angle_to(&body.direction);
                 assert!(apart_rad <= body.uncertainty_rad, "{:?}", body.kind);
             }
@@ -158,7 +158,7 @@ fn what_is_not_known_of_the_time_is_stated() {
         bodies_at(&day, TimeError::None, None),
         bodies_at(&noon, TimeError::Day, None)
     );
-    let jupiter = of(BodyKind::Jupiter, &bodies_at(&day, TimeError::None, None));
+    let jupiter = find(BodyKind::Jupiter, &bodies_at(&day, TimeError::None, None));
     assert!(jupiter.uncertainty_rad * DEG_PER_RAD < 0.3);
 }
 
@@ -192,11 +192,11 @@ fn magnitudes_and_sizes_are_those_of_the_almanac() {
         (BodyKind::Neptune, "2019-09-10T00:00:00Z", 7.8),
         (BodyKind::Moon, "2010-06-26T11:30:00Z", -12.6),
     ] {
-        let found = of(kind, &at(date, None)).v_mag;
+        let found = find(kind, &at(date, None)).v_mag;
         assert!((found - v_mag).abs() < 0.25, "{kind:?} at {date}: {found}");
     }
     // Horizons gives a diameter of 42.839 arcsec.
-    let jupiter = of(BodyKind::Jupiter, &at("2008-05-14T00:00:00Z", None));
+    let jupiter = find(BodyKind::Jupiter, &at("2008-05-14T00:00:00Z", None));
     assert!((2.0 * jupiter.radius_rad * ARCSEC_PER_RAD - 42.84).abs() < 0.02);
 }
 

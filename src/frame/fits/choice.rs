@@ -3,7 +3,7 @@
 use super::error::unsupported;
 use super::layout::FitsLayout;
 use super::unit::{FitsUnit, Units};
-use crate::frame::account::ReadBudget;
+use crate::frame::read_budget::ReadBudget;
 use crate::frame::{Assumption, FrameError, ImageChoice, MIN_SIDE_PX};
 use std::num::NonZeroUsize;
 

@@ -83,7 +83,7 @@ impl Keywords<'_> {
         let Some(text) = self.text(KEYWORD) else {
             return Some(TimeScale::Utc);
         };
-        let scale = TimeScale::of(&text);
+        let scale = TimeScale::parse(&text);
         if scale.is_none() {
             metadata.ignore(KEYWORD, &text, TimeScale::EXPECTED);
         }

@@ -5,8 +5,8 @@ use super::layout::FitsLayout;
 use super::tiles;
 use super::unit::{FitsUnit, StoredType};
 use crate::base::size::Size;
-use crate::frame::account::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use crate::frame::levels::{LevelSamples, WholeNumber, frame_from_floats, frame_from_integers};
+use crate::frame::read_budget::{FLOATS_BYTES_PER_PIXEL, ReadBudget};
 use crate::frame::{Frame, FrameError, check_size};
 
 /// Location and scaling of one image in a file.
@@ -19,7 +19,7 @@ pub(super) struct FitsImage<'a> {
     zero: f64,
     /// The stored integer that marks a pixel without a value.
     blank: Option<i64>,
-    account: &'a ReadBudget,
+    budget: &'a ReadBudget,
 }
 
 impl<'a> FitsImage<'a> {
@@ -55,7 +55,7 @@ impl<'a> FitsImage<'a> {
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
             blank: unit.blank().filter(|_| !unit.stored.is_float()),
-            account,
+            budget: account,
         };
         let bytes_per_pixel = image.bytes_per_pixel(unit.is_compressed_image());
         account.check_image(Size::new(width, height), bytes_per_pixel)?;
@@ -86,7 +86,7 @@ impl<'a> FitsImage<'a> {
         let first = values.saturating_mul(self.plane);
         if unit.is_compressed_image() {
             let range = first..first.saturating_add(values);
-            return self.frame_of(&tiles::unpack(unit, bytes, range, self.account)?);
+            return self.frame_of(&tiles::unpack(unit, bytes, range, self.budget)?);
         }
         let before = first.saturating_mul(self.stored.bytes());
         let start = unit.data.saturating_add(before);
@@ -153,7 +153,7 @@ impl<'a> FitsImage<'a> {
             values: &values,
             channels,
         };
-        let frame = frame_from_integers(&samples, full_scale, self.account)?;
+        let frame = frame_from_integers(&samples, full_scale, self.budget)?;
         let Some(blank) = self.blank else {
             return Ok(frame);
         };
@@ -216,6 +216,6 @@ impl<'a> FitsImage<'a> {
             ..
         } = self.layout;
         let values = self.layout.interleaved(levels);
-        frame_from_floats(Size::new(width, height), channels, values, self.account)
+        frame_from_floats(Size::new(width, height), channels, values, self.budget)
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct FitsLayout {
 
 impl FitsLayout {
     /// The layout of these axes; `None` if there are fewer than two or one is empty.
-    pub fn of(axes: &[usize]) -> Option<Self> {
+    pub fn from_axes(axes: &[usize]) -> Option<Self> {
         if axes.len() < 2 || axes.contains(&0) {
             return None;
         }
@@ -106,8 +106,8 @@ impl FitsLayout {
 mod tests {
     use super::*;
 
-    fn of(axes: &[usize]) -> (usize, usize, usize, usize) {
-        let layout = FitsLayout::of(axes).unwrap();
+    fn sizes(axes: &[usize]) -> (usize, usize, usize, usize) {
+        let layout = FitsLayout::from_axes(axes).unwrap();
         (layout.width, layout.height, layout.channels, layout.pages)
     }
 
@@ -133,14 +133,14 @@ mod tests {
             (&[8, 1], (8, 1, 1, 1)),
             (&[1, 1, 1], (1, 1, 1, 1)),
         ] {
-            assert_eq!(of(axes), expected, "{axes:?}");
+            assert_eq!(sizes(axes), expected, "{axes:?}");
         }
         for axes in [&[][..], &[8], &[8, 0], &[8, 6, 0]] {
-            assert_eq!(FitsLayout::of(axes), None, "{axes:?}");
+            assert_eq!(FitsLayout::from_axes(axes), None, "{axes:?}");
         }
         let huge = usize::MAX;
-        assert_eq!(of(&[3, huge, huge]), (huge, huge, 3, 1));
-        assert_eq!(of(&[huge, huge, huge, 2]).3, huge);
+        assert_eq!(sizes(&[3, huge, huge]), (huge, huge, 3, 1));
+        assert_eq!(sizes(&[huge, huge, huge, 2]).3, huge);
     }
 
     #[test]
@@ -155,7 +155,7 @@ mod tests {
                 let [i, j, k] = place(x, y, c);
                 stored[(k * axes[1] + j) * axes[0] + i] = at(x, y, c);
             }
-            FitsLayout::of(&axes).unwrap().interleaved(stored)
+            FitsLayout::from_axes(&axes).unwrap().interleaved(stored)
         };
         assert_eq!(order([8, 6, 3], |x, y, c| [x, y, c]), pixels);
         assert_eq!(order([3, 8, 6], |x, y, c| [c, x, y]), pixels);

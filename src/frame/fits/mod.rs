@@ -36,9 +36,9 @@ pub(crate) use header::BLOCK_BYTES;
 pub(crate) use write::write_rows;
 pub use write::{FitsSamples, FitsWriteError, write_fits};
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::image::Frame;
+use super::read_budget::ReadBudget;
 use choice::ChosenFitsImage;
 use header::UnitHeader;
 use image::FitsImage;

@@ -3,10 +3,10 @@
 
 use super::keywords::Keywords;
 use crate::base::statistics::median_of_rounded;
-use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::image::Frame;
 use crate::frame::metadata::FrameMetadata;
+use crate::frame::read_budget::ReadBudget;
 use std::ops::Range;
 
 const KEYWORD: &str = "BIASSEC";

@@ -1,6 +1,6 @@
 use super::header::BLOCK_BYTES;
 use super::*;
-use crate::frame::account::ReadBudget;
+use crate::frame::read_budget::ReadBudget;
 use crate::frame::{BayerPattern, RowOrder};
 use proptest::prelude::*;
 

@@ -39,7 +39,7 @@ impl TimeScale {
     pub const EXPECTED: &str = "UTC, UT1, TAI, TT, TDB or GPS";
 
     /// The scale that `word` names, in any case; a realization in brackets is dropped: `UTC(NIST)`.
-    pub fn of(word: &str) -> Option<Self> {
+    pub fn parse(word: &str) -> Option<Self> {
         let word = word.split('(').next().unwrap_or_default().trim();
         let known = WORDS
             .iter()
@@ -51,7 +51,7 @@ impl TimeScale {
     /// `20:47:26(TAI)`.
     pub fn behind(text: &str) -> Option<(&str, Self)> {
         let (before, scale) = match text.strip_suffix(')').and_then(|text| text.split_once('(')) {
-            Some((before, word)) => (before, Self::of(word)?),
+            Some((before, word)) => (before, Self::parse(word)?),
             None => WORDS.iter().find_map(|&(word, scale)| {
                 let (before, end) = text.split_at_checked(text.len().checked_sub(word.len())?)?;
                 end.eq_ignore_ascii_case(word).then_some((before, scale))
@@ -123,7 +123,7 @@ mod tests {
         ] {
             assert_eq!(TimeScale::behind(text), expected, "{text}");
         }
-        assert_eq!(TimeScale::of(" utc(NIST) "), Some(TimeScale::Utc));
-        assert_eq!(TimeScale::of("LOCAL"), None);
+        assert_eq!(TimeScale::parse(" utc(NIST) "), Some(TimeScale::Utc));
+        assert_eq!(TimeScale::parse("LOCAL"), None);
     }
 }

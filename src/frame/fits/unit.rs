@@ -59,7 +59,7 @@ pub(super) enum StoredType {
 }
 
 impl StoredType {
-    fn of(header: &UnitHeader, keyword: &str) -> Result<Self, FrameError> {
+    fn parse(header: &UnitHeader, keyword: &str) -> Result<Self, FrameError> {
         const EXPECTED: &str = "8, 16, 32, 64, -32 or -64";
         Ok(match header.required(keyword, EXPECTED)? {
             8 => Self::U8,
@@ -114,11 +114,11 @@ pub(super) struct FitsUnit<'a> {
 
 impl<'a> FitsUnit<'a> {
     fn new(header: UnitHeader<'a>, data: usize) -> Result<Self, FrameError> {
-        let stored = StoredType::of(&header, "BITPIX")?;
+        let stored = StoredType::parse(&header, "BITPIX")?;
         let axes = axes(&header, "NAXIS")?;
         let data_bytes = data_bytes(&header, &axes, stored);
         let (stored, axes, table) = if header.is_true("ZIMAGE") {
-            let stored = StoredType::of(&header, "ZBITPIX")?;
+            let stored = StoredType::parse(&header, "ZBITPIX")?;
             (stored, self::axes(&header, "ZNAXIS")?, axes)
         } else {
             (stored, axes, Vec::new())
@@ -187,7 +187,7 @@ impl<'a> FitsUnit<'a> {
     pub fn layout(&self) -> Option<FitsLayout> {
         let kind = self.header.text("XTENSION");
         let is_image = self.is_compressed_image() || kind.is_none_or(|kind| kind == "IMAGE");
-        FitsLayout::of(&self.axes).filter(|_| is_image)
+        FitsLayout::from_axes(&self.axes).filter(|_| is_image)
     }
 
     /// Number of images in it: none, one, or the planes of a cube.

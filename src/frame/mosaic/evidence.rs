@@ -31,7 +31,7 @@ const ALIKE: f64 = 0.25;
 /// where its header states a pattern.
 pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Option<Diagonal> {
     if let Some(pattern) = stated {
-        let found = Contrasts::of(frame, MAX_PATCHES)?;
+        let found = Contrasts::measure(frame, MAX_PATCHES)?;
         return found
             .is_any()
             .then(|| found.alike().unwrap_or(pattern.green()));
@@ -39,7 +39,7 @@ pub(super) fn green_diagonal(frame: &Frame, stated: Option<BayerPattern>) -> Opt
     if !may_be_mosaic(frame) {
         return None;
     }
-    let found = Contrasts::of(frame, MAX_PATCHES)?;
+    let found = Contrasts::measure(frame, MAX_PATCHES)?;
     found.is_by_light().then(|| found.green()).flatten()
 }
 
@@ -75,7 +75,7 @@ struct Contrasts {
 
 impl Contrasts {
     /// Those of `frame`, in up to `most` patches along each axis.
-    fn of(frame: &Frame, most: usize) -> Option<Self> {
+    fn measure(frame: &Frame, most: usize) -> Option<Self> {
         let patches = patches_of(frame, most);
         if patches.len() < MIN_PATCHES {
             return None;

@@ -63,7 +63,7 @@ impl Mosaic {
     /// The filter over the pixel in column `x`, row `y`: 0 for the one that two in four pixels have, green; 1
     /// for that in even rows beside it, 2 for that in odd rows.
     pub(crate) fn filter(&self, x: usize, y: usize) -> usize {
-        if Diagonal::of(x, y) == self.green {
+        if Diagonal::at(x, y) == self.green {
             0
         } else {
             1 + y % 2

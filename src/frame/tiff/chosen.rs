@@ -2,11 +2,11 @@
 
 use super::directory::{TiffDirectory, TiffFile, malformed};
 use super::layout::{stated_size, tag};
-use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::limits::MAX_PAGES;
 use crate::frame::metadata::ImageChoice;
 use crate::frame::orientation::Orientation;
+use crate::frame::read_budget::ReadBudget;
 use std::num::NonZeroUsize;
 
 /// The image that is read.

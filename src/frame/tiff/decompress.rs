@@ -3,9 +3,9 @@
 use super::directory::{TiffFile, malformed, truncated};
 use super::layout::{Chunk, Color, Compression, Layout};
 use crate::base::size::Size;
-use crate::frame::account::ReadBudget;
 use crate::frame::error::FrameError;
 use crate::frame::jpeg::Jpeg;
+use crate::frame::read_budget::ReadBudget;
 use std::borrow::Cow;
 use std::io::Read;
 
@@ -13,7 +13,7 @@ use std::io::Read;
 #[derive(Clone, Copy)]
 pub(super) struct ChunkSource<'a> {
     pub file: TiffFile<'a>,
-    pub account: &'a ReadBudget,
+    pub budget: &'a ReadBudget,
 }
 
 /// Rows of a chunk.
@@ -31,7 +31,10 @@ impl Layout<'_> {
         source: ChunkSource<'a>,
         chunk: &Chunk,
     ) -> Result<StripRows<'a>, FrameError> {
-        let ChunkSource { file, account } = source;
+        let ChunkSource {
+            file,
+            budget: account,
+        } = source;
         account.check_time()?;
         let row_bytes = self.row_bytes();
         let wanted = row_bytes.saturating_mul(chunk.rows);

@@ -65,7 +65,7 @@ impl<'a> TiffFile<'a> {
     /// The file in `bytes`.
     /// # Errors
     /// [`FrameError::Malformed`] for other formats, [`FrameError::Truncated`].
-    pub fn of(bytes: &'a [u8]) -> Result<Self, FrameError> {
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, FrameError> {
         let (is_little_endian, is_big) = match bytes.first_chunk() {
             Some(b"II*\0") => (true, false),
             Some(b"MM\0*") => (false, false),

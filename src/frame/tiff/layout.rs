@@ -2,10 +2,10 @@
 
 use super::directory::{TagNumbers, TiffDirectory, malformed};
 use crate::base::size::Size;
-use crate::frame::account::FLOATS_BYTES_PER_PIXEL;
 use crate::frame::error::FrameError;
 use crate::frame::format::FrameFormat;
 use crate::frame::image::check_size;
+use crate::frame::read_budget::FLOATS_BYTES_PER_PIXEL;
 
 /// Tags of TIFF 6.0, by their names there.
 pub(super) mod tag {
@@ -122,19 +122,19 @@ impl<'a> Layout<'a> {
     /// # Errors
     /// [`FrameError::Unsupported`], [`FrameError::Malformed`], [`FrameError::TooLarge`],
     /// [`FrameError::TooSmall`], [`FrameError::Truncated`].
-    pub fn of(directory: &TiffDirectory<'a>) -> Result<Self, FrameError> {
+    pub fn parse(directory: &TiffDirectory<'a>) -> Result<Self, FrameError> {
         let Size { width, height } = stated_size(directory)?;
         check_size(width, height)?;
         let samples = directory.first(tag::SAMPLES_PER_PIXEL, 1)? as usize;
         let depth = SampleType::of(directory)?;
-        let color = Color::of(directory)?;
+        let color = Color::parse(directory)?;
         let channels = color.channels(samples)?;
-        let compression = Compression::of(directory, depth, color)?;
+        let compression = Compression::parse(directory, depth, color)?;
         if color == Color::WhiteIsZero && depth.format == SampleFormat::Signed {
             let found = "signed integers with white at 0".to_owned();
             return Err(unsupported(found, COLORS));
         }
-        let predictor = Predictor::of(directory, depth, compression)?;
+        let predictor = Predictor::parse(directory, depth, compression)?;
         let is_planar = match directory.first(tag::PLANAR_CONFIGURATION, 1)? {
             1 => false,
             2 => samples > 1,
@@ -354,7 +354,7 @@ impl SampleType {
 }
 
 impl Color {
-    fn of(directory: &TiffDirectory) -> Result<Self, FrameError> {
+    fn parse(directory: &TiffDirectory) -> Result<Self, FrameError> {
         if !directory.has(tag::PHOTOMETRIC) {
             let detail = format!("no PhotometricInterpretation (tag {})", tag::PHOTOMETRIC);
             return Err(malformed(detail));
@@ -392,7 +392,11 @@ impl Color {
 }
 
 impl Compression {
-    fn of(directory: &TiffDirectory, depth: SampleType, color: Color) -> Result<Self, FrameError> {
+    fn parse(
+        directory: &TiffDirectory,
+        depth: SampleType,
+        color: Color,
+    ) -> Result<Self, FrameError> {
         let code = directory.first(tag::COMPRESSION, 1)?;
         let found = match code {
             1 => Self::None,
@@ -424,7 +428,7 @@ impl Compression {
 }
 
 impl Predictor {
-    fn of(
+    fn parse(
         directory: &TiffDirectory,
         depth: SampleType,
         compression: Compression,

@@ -14,7 +14,6 @@ mod layout;
 mod samples;
 mod write;
 
-use super::account::ReadBudget;
 use super::error::FrameError;
 use super::exif;
 use super::image::Frame;
@@ -22,6 +21,7 @@ use super::levels::{
     LevelSamples, WholeNumber, frame_from_floats, frame_from_integers, frame_from_words,
 };
 use super::limits::MAX_PAGES;
+use super::read_budget::ReadBudget;
 use crate::base::size::Size;
 use chosen::Chosen;
 use decompress::ChunkSource;
@@ -42,12 +42,12 @@ pub(super) fn decode(
     account: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
-    let file = TiffFile::of(bytes)?;
+    let file = TiffFile::parse(bytes)?;
     let chosen = match page {
         Some(page) => Chosen::page(file, page)?,
         None => Chosen::largest(file, account)?,
     };
-    let layout = Layout::of(&chosen.directory)?;
+    let layout = Layout::parse(&chosen.directory)?;
     let size = Size::new(layout.width, layout.height);
     account.check_image(size, layout.bytes_per_pixel())?;
     let frame = match layout.plain_words() {
@@ -57,7 +57,10 @@ pub(super) fn decode(
         }
         None => {
             drop(buffer);
-            layout.frame(ChunkSource { file, account })
+            layout.frame(ChunkSource {
+                file,
+                budget: account,
+            })
         }
     };
     let mut metadata = exif::metadata(bytes, layout.width);
@@ -69,7 +72,7 @@ pub(super) fn decode(
 /// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
 /// be found.
 pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<FrameError>) {
-    let file = match TiffFile::of(bytes) {
+    let file = match TiffFile::parse(bytes) {
         Ok(file) => file,
         Err(error) => return (0, Some(error)),
     };
@@ -85,7 +88,7 @@ pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<
 
 impl Layout<'_> {
     fn frame(&self, source: ChunkSource) -> Result<Frame<'static>, FrameError> {
-        let account = source.account;
+        let account = source.budget;
         let full = self.depth.full_scale();
         // Values of more than 24 bits are rounded.
         let rounded = |values: Vec<f32>| Ok(self.floats(values, account)?.with_levels(1.0, None));

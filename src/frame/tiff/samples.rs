@@ -2,8 +2,8 @@
 
 use super::decompress::{ChunkSource, StripRows};
 use super::layout::{Chunk, Color, Layout, Predictor, SampleFormat};
-use crate::frame::account::PIXELS_BETWEEN_CHECKS;
 use crate::frame::error::FrameError;
+use crate::frame::read_budget::PIXELS_BETWEEN_CHECKS;
 use std::ops::BitXor;
 
 /// An unsigned word that samples are unpacked to; signed numbers and floats keep their bits.
@@ -73,7 +73,7 @@ impl Layout<'_> {
         let rows_between_checks = PIXELS_BETWEEN_CHECKS.div_ceil(row.len());
         for (line, y) in lines.zip(chunk.top..) {
             if y.is_multiple_of(rows_between_checks) {
-                source.account.check_time()?;
+                source.budget.check_time()?;
             }
             let start = y * row_samples + chunk.left * self.channels + chunk.plane;
             let end = (y + 1) * row_samples;

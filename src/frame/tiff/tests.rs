@@ -506,7 +506,7 @@ fn samples_of_a_pixel_need_no_memory_before_their_bytes_are_there() {
 #[test]
 fn numbers_of_a_directory_are_of_the_types_that_hold_them() {
     let bytes = tiff(&[Page::grey(4, 3, 1)], false);
-    let file = TiffFile::of(&bytes).unwrap();
+    let file = TiffFile::parse(&bytes).unwrap();
     let directories: Result<Vec<TiffDirectory>, FrameError> = file.directories().collect();
     let [directory] = directories.unwrap().try_into().ok().unwrap();
     let numbers = |tag: u16| -> Vec<u64> { directory.numbers(tag).unwrap().iter().collect() };

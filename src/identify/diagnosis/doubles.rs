@@ -14,10 +14,10 @@ const TOLERANCE_MAG: f64 = 0.7;
 /// Fewest pairs with the offset, …
 const MIN_PAIRS: usize = 6;
 /// … as a fraction of the stars. If all stars occur twice it is a half.
-const MIN_SHARE: f64 = 0.25;
+const MIN_FRACTION: f64 = 0.25;
 /// Largest number of pairs with another offset, over that with the best one: regular patterns have
 /// many offsets.
-const SECOND_SHARE: f64 = 0.6;
+const SECOND_FRACTION: f64 = 0.6;
 
 /// The offset from one star to another.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ pub fn find_unnamed(
 ) -> Option<DoubleImage> {
     let stars = field.brightest(LOOKED_AT);
     let unnamed = stars.iter().filter(|star| !is_named(star)).count();
-    let is_possible = unnamed >= MIN_PAIRS && unnamed as f64 >= MIN_SHARE * stars.len() as f64;
+    let is_possible = unnamed >= MIN_PAIRS && unnamed as f64 >= MIN_FRACTION * stars.len() as f64;
     is_possible.then(|| find(field)).flatten()
 }
 
@@ -60,14 +60,14 @@ pub(super) fn find(field: &StarField) -> Option<DoubleImage> {
     let most = (0..offsets.len()).max_by_key(|&i| counts[i])?;
     let count = counts[most];
     let stars = field.stars.len().min(LOOKED_AT);
-    if count < MIN_PAIRS || (count as f64) < MIN_SHARE * stars as f64 {
+    if count < MIN_PAIRS || (count as f64) < MIN_FRACTION * stars as f64 {
         return None;
     }
     let second = (0..offsets.len())
         .filter(|&i| !offsets[i].is_near(&offsets[most], 3.0 * TOLERANCE_PX))
         .map(|i| counts[i])
         .max();
-    if second.is_some_and(|second| second as f64 > SECOND_SHARE * count as f64) {
+    if second.is_some_and(|second| second as f64 > SECOND_FRACTION * count as f64) {
         return None;
     }
     let agreeing = pairs(&offsets, most);

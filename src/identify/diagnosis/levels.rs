@@ -5,7 +5,7 @@ use crate::base::statistics::median;
 use crate::frame::Frame;
 
 /// Fraction of pixels at the highest level from which a frame is overexposed.
-const SATURATED_SHARE: f64 = 0.2;
+const SATURATED_FRACTION: f64 = 0.2;
 /// Median over the highest level from which a frame is overexposed where it reaches full scale.
 const FULL_SKY: f64 = 0.9;
 /// Fewest steps between the lowest and the highest level for the latter to be a full scale.
@@ -45,7 +45,7 @@ pub(super) fn diagnose(frame: &Frame) -> Option<Diagnosis> {
     let sky = median(&mut sample.collect::<Vec<_>>());
     let sky = (sky - dark) / (f64::from(full) - dark);
     let is_sky_full = is_full && sky > FULL_SKY;
-    (share > SATURATED_SHARE || is_sky_full).then_some(Diagnosis::Saturated {
+    (share > SATURATED_FRACTION || is_sky_full).then_some(Diagnosis::Saturated {
         share,
         sky,
         level_adu: f64::from(full),

@@ -14,7 +14,7 @@ const LOOKED_AT: usize = 60;
 /// Each star makes pairs with so many near ones.
 const NEIGHBORS: usize = 4;
 /// Nearer stars make no pair, as a share of the frame's width: they would tell scale and angle badly.
-const LEAST_APART: f64 = 0.02;
+const MIN_APART: f64 = 0.02;
 /// Scales that are looked for.
 const SCALES: std::ops::Range<f64> = 0.4..2.5;
 /// How far a star may be from where it is expected, in pixels, …
@@ -68,7 +68,7 @@ pub fn find(field: &StarField, is_named: impl Fn(&ObservedStar) -> bool) -> Opti
         return None;
     }
     unnamed.sort_by(|a, b| a.position.x.total_cmp(&b.position.x));
-    let least_px = LEAST_APART * field.width_px;
+    let least_px = MIN_APART * field.width_px;
     let [originals, copies] = [&named, &unnamed].map(|stars| pairs(stars, least_px));
     let density = density(&unnamed, field.width_px * field.height_px);
     let hypotheses = (2 * originals.len() * copies.len()) as f64;

@@ -12,7 +12,7 @@ use std::collections::HashSet;
 /// Number of detections examined, the brightest.
 const LOOKED_AT: usize = 80;
 /// A source's region is above this fraction of its peak, and above this many noise sigmas.
-const PEAK_SHARE: f32 = 0.25;
+const PEAK_FRACTION: f32 = 0.25;
 const NOISE_SIGMA: f32 = 4.0;
 /// Largest region of a star, in pixels.
 const MAX_PX: usize = 6000;
@@ -55,7 +55,7 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
     let areas = areas(frame, &above, detections);
     let bars: Vec<SourceStreak> = areas
         .iter()
-        .filter_map(|area| bar(area, frame.width))
+        .filter_map(|area| streak_profile(area, frame.width))
         .collect();
     let trails: Vec<&SourceStreak> = bars.iter().filter(|bar| bar.is_trail()).collect();
     let count = trails.len();
@@ -104,7 +104,7 @@ fn areas(frame: &Frame, above: &[f32], detections: &Detections) -> Vec<Vec<usize
         if taken.contains(&start) {
             continue;
         }
-        let threshold = (PEAK_SHARE * above[start]).max(NOISE_SIGMA * noise);
+        let threshold = (PEAK_FRACTION * above[start]).max(NOISE_SIGMA * noise);
         let area = connected(frame, above, start, threshold);
         taken.extend(area.iter().copied());
         if area.len() >= MIN_PX {
@@ -161,7 +161,7 @@ fn connected(frame: &Frame, above: &[f32], start: usize, threshold: f32) -> Vec<
 }
 
 /// The bar with the second moments of the region; `None` if it is too large for a star.
-fn bar(area: &[usize], width: usize) -> Option<SourceStreak> {
+fn streak_profile(area: &[usize], width: usize) -> Option<SourceStreak> {
     if area.len() > MAX_PX {
         return None;
     }
@@ -201,14 +201,14 @@ mod tests {
             .flat_map(|x| [(50, x), (51, x)])
             .map(|(y, x)| y * width + x)
             .collect();
-        let flat = bar(&area, width).unwrap();
+        let flat = streak_profile(&area, width).unwrap();
         assert!((flat.length_px - 20.0).abs() < 1e-9 && (flat.breadth_px - 2.0).abs() < 1e-9);
         assert!(flat.angle_rad.abs() < 1e-12 && flat.is_trail());
         let rising: Vec<usize> = (0..20).map(|i| (60 - i) * width + i).collect();
-        let rising = bar(&rising, width).unwrap();
+        let rising = streak_profile(&rising, width).unwrap();
         assert!((rising.angle_rad - std::f64::consts::FRAC_PI_4).abs() < 1e-9);
         let square: Vec<usize> = (0..25).map(|i| (i / 5) * width + i % 5).collect();
-        assert!(!bar(&square, width).unwrap().is_trail());
+        assert!(!streak_profile(&square, width).unwrap().is_trail());
     }
 
     proptest! {

@@ -27,13 +27,13 @@ pub struct MeasuredStar {
 
 impl MeasuredStar {
     /// The observed star of a pair; all measure worse by `excess_px` than stated.
-    pub fn of(star: &ObservedStar, pair: &Pair, excess_px: f64) -> Self {
+    pub fn new(star: &ObservedStar, pair: &Pair, excess_px: f64) -> Self {
         /// Errors of lists that state none.
-        const LEAST_PX: f64 = 1e-3;
+        const MIN_PX: f64 = 1e-3;
         Self {
             pixel: star.position,
             icrs: pair.direction,
-            sigma_px: libm::hypot(pair.sigma_px(star), excess_px).max(LEAST_PX),
+            sigma_px: libm::hypot(pair.sigma_px(star), excess_px).max(MIN_PX),
         }
     }
 }
@@ -47,7 +47,7 @@ pub(super) const MAX_PARAMETERS: usize = POSE_PARAMETERS + MAX_TERMS;
 /// Maximum number of steps.
 const MAX_ITERATIONS: usize = 30;
 /// Smallest share of a step that is tried.
-const MIN_SHARE: f64 = 0.01;
+const MIN_FRACTION: f64 = 0.01;
 /// Largest step in radians: beyond it the fit has diverged.
 const MAX_STEP: f64 = 0.5;
 /// What lenses are like: standard deviation of the terms about zero, in units of half the frame's
@@ -107,16 +107,16 @@ pub(super) struct KnownAxis {
 impl KnownAxis {
     /// That of a camera. The monomials can take the place of the axis: it stays where the lens has it. The attitude of
     /// a lens that is no pinhole is that of its axis, and has all of the axis's error, `sigma_px`.
-    pub fn of(camera: &CameraModel, sigma_px: [f64; 2]) -> Self {
+    pub fn from_camera(camera: &CameraModel, sigma_px: [f64; 2]) -> Self {
         /// Standard error of an axis that stays.
-        const HELD_PX: f64 = 0.01;
+        const FIXED_PX: f64 = 0.01;
         let distortion = camera.distortion();
         Self {
             at_px: distortion.map_or([0.0; 2], Distortion::axis_offset_px),
             sigma_px: if camera.is_pinhole() {
-                [HELD_PX; 2]
+                [FIXED_PX; 2]
             } else {
-                sigma_px.map(|sigma_px| sigma_px.max(HELD_PX))
+                sigma_px.map(|sigma_px| sigma_px.max(FIXED_PX))
             },
         }
     }
@@ -362,7 +362,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
     /// The same with the axis that the camera has, with these errors.
     pub fn with_known_axis(self, sigma_px: [f64; 2]) -> Self {
         Self {
-            prior: Prior::Axis(KnownAxis::of(self.camera(), sigma_px)),
+            prior: Prior::Axis(KnownAxis::from_camera(self.camera(), sigma_px)),
             ..self
         }
     }
@@ -538,7 +538,7 @@ impl<'a, const P: usize> Adjustment<'a, P> {
                 self.predictor.take(change.as_slice(), share, self.model);
                 match self.normal() {
                     Some(next) if next.misfit <= normal.misfit => break next,
-                    _ if share > MIN_SHARE => {
+                    _ if share > MIN_FRACTION => {
                         self.predictor = before;
                         share *= 0.5;
                     }

@@ -37,7 +37,7 @@ const MAX_CHANCE: f64 = 0.1;
 const RADIUS_SIGMAS: f64 = 3.0;
 const MIN_RADIUS_PX: f64 = 1.5;
 /// Largest such radius, in diagonals of the frame.
-const MAX_RADIUS_SHARE: f64 = 0.005;
+const MAX_RADIUS_FRACTION: f64 = 0.005;
 /// Smallest error of a star's place, in pixels, while the lens is not known well.
 const MIN_SIGMA_PX: f64 = 0.3;
 /// How far beyond the stars that agree others are looked for, in radians.
@@ -226,7 +226,7 @@ impl Growth {
             };
             let radius_px = RADIUS_SIGMAS * sigma_px + MIN_RADIUS_PX;
             let chance = PI * radius_px * radius_px * density_px2;
-            if chance > MAX_CHANCE || radius_px > MAX_RADIUS_SHARE * diagonal_px {
+            if chance > MAX_CHANCE || radius_px > MAX_RADIUS_FRACTION * diagonal_px {
                 continue;
             }
             let found = self.nearest(problem, &hypothesis, star, radius_px);

@@ -12,7 +12,7 @@ use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Vecto
 /// Maximum number of steps.
 const MAX_STEPS: usize = 40;
 /// Smallest share of a step that is tried.
-const MIN_SHARE: f64 = 0.01;
+const MIN_FRACTION: f64 = 0.01;
 /// The fit has converged where a step moves the predicted places by less than this, in standard errors.
 const CONVERGED: f64 = 1e-3;
 
@@ -47,7 +47,7 @@ pub(crate) fn fit_jointly(
     if model >= Some(DistortionModel::Irregular3) {
         let lens = fit_jointly(frames, &camera, Some(DistortionModel::Stretched))?;
         camera = lens.camera;
-        axis = Some(KnownAxis::of(&camera, [0.0; 2]));
+        axis = Some(KnownAxis::from_camera(&camera, [0.0; 2]));
     }
     let predictor =
         |frame: &JointFrame| PositionPredictor::new(&camera, &frame.icrs_to_camera, model);
@@ -188,7 +188,7 @@ impl Joint<'_> {
     ) -> Option<JointNormal> {
         let before = self.predictors.clone();
         let mut share = share;
-        while share > MIN_SHARE {
+        while share > MIN_FRACTION {
             self.take(step, share);
             let next = self.normal().filter(|next| next.misfit <= normal.misfit);
             if next.is_some() {

@@ -429,7 +429,7 @@ impl Refiner {
     fn measure(&mut self, problem: Problem, excess_px: f64) {
         let measured = |pair: &Pair| {
             let star = &problem.field.stars[pair.observed];
-            let mut measured = MeasuredStar::of(star, pair, excess_px);
+            let mut measured = MeasuredStar::new(star, pair, excess_px);
             measured.sigma_px = huber_sigma(measured.sigma_px, pair.residual_px);
             measured
         };
@@ -480,14 +480,14 @@ impl Refiner {
     /// stated for, and disturbs few of the stars.
     fn overstated(&self, parameters: usize) -> f64 {
         /// Larger residuals are of wrong names, in errors.
-        const MOST_SIGMAS: f64 = 3.0;
+        const MAX_SIGMAS: f64 = 3.0;
         let squares = &self.scratch.squares;
         let count = squares.len().max(1) as f64;
         let in_errors = |&(square, stated): &(f64, f64)| {
-            (0.5 * square / stated.max(1e-6)).min(MOST_SIGMAS.powi(2))
+            (0.5 * square / stated.max(1e-6)).min(MAX_SIGMAS.powi(2))
         };
         let mean = squares.iter().map(in_errors).sum::<f64>() / count;
-        let share = mean / self.free_share(parameters);
+        let share = mean / self.free_fraction(parameters);
         // The standard error of the mean of an exponential distribution is 1.
         if share < 1.0 - EXCESS_SIGMAS / count.sqrt() {
             share
@@ -497,7 +497,7 @@ impl Refiner {
     }
 
     /// Degrees of freedom over equations.
-    fn free_share(&self, parameters: usize) -> f64 {
+    fn free_fraction(&self, parameters: usize) -> f64 {
         let equations = 2.0 * self.pairs.len() as f64;
         (equations - parameters as f64).max(1.0) / equations.max(1.0)
     }
@@ -506,7 +506,7 @@ impl Refiner {
     /// median residual; 0 where chance explains it. Only the better measured half of the stars
     /// counts: the faintest were detected because noise made them brighter, and it moved them, too.
     fn excess_sigma_of(&mut self, problem: Problem, parameters: usize) -> f64 {
-        let expected_sq = RAYLEIGH_MEDIAN.powi(2) * self.free_share(parameters);
+        let expected_sq = RAYLEIGH_MEDIAN.powi(2) * self.free_fraction(parameters);
         let stars = &problem.field.stars;
         let stated_sq = |pair: &Pair| pair.sigma_px(&stars[pair.observed]).powi(2);
         let worst_sq = self.scratch.median(self.pairs.iter().map(stated_sq));

@@ -314,7 +314,7 @@ impl FittedLens {
                 name: frame.name.clone(),
                 stars: frame.stars(),
                 rms_px: rms_of(residuals.iter()),
-                scale: FrameScale::of(frame, &fit.camera, excess_sigma_px),
+                scale: FrameScale::fit(frame, &fit.camera, excess_sigma_px),
                 pointing: frame.pointing(),
             });
         let used: Vec<UsedFrame> = used.collect();
@@ -324,8 +324,8 @@ impl FittedLens {
         });
         Some(LensCalibration {
             coverage: Coverage::new(&camera, &frames, &fit.residuals_px),
-            drift: ScaleDrift::of(&dated.collect::<Vec<_>>()),
-            mount: Mount::of(&frames),
+            drift: ScaleDrift::fit(&dated.collect::<Vec<_>>()),
+            mount: Mount::measure(&frames),
             stars: frames.iter().map(LensFrame::stars).sum(),
             rms_px: rms_of(fit.residuals_px.iter().flatten()),
             lens: KnownLens::new(camera, fit.covariance * factor)?,

@@ -9,7 +9,7 @@ pub(super) const MISFIT: f64 = 2.0;
 /// The least such distance, in pixels.
 pub(super) const MISFIT_PX: f64 = 0.1;
 /// Frames that are tried as those that the others are compared with.
-const MOST_REFERENCES: usize = 12;
+const MAX_REFERENCES: usize = 12;
 
 /// The frames whose stars are missed by a lens that is fitted to them and to one frame, although their own
 /// lens does not miss them: of the frames that could be that one, it is the one with the fewest such, of
@@ -47,7 +47,7 @@ pub(super) fn contradictions(frames: &[JointFrame], fit: &JointFit) -> Vec<(usiz
         });
         missed.collect::<Vec<_>>()
     };
-    let references = 0..frames.len().min(MOST_REFERENCES);
+    let references = 0..frames.len().min(MAX_REFERENCES);
     references
         .map(against)
         .min_by_key(Vec::len)

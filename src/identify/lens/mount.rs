@@ -24,7 +24,7 @@ const STILL_RAD: f64 = 0.01;
 
 impl Mount {
     /// `None` if site and time of two frames or more are not known, or the camera has moved.
-    pub(super) fn of(frames: &[LensFrame]) -> Option<Self> {
+    pub(super) fn measure(frames: &[LensFrame]) -> Option<Self> {
         let places = frames.iter().map(|frame| {
             let zenith = frame.joint.icrs_to_camera.apply(frame.places.zenith()?);
             Some((zenith, frame.observation?.azimuth_rad))

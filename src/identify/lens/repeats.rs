@@ -29,7 +29,7 @@ pub(super) struct Repeats {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct CommonError {
     /// The share of the noise of the centroids.
-    noise_share: f64,
+    noise_fraction: f64,
     /// Its variance on each axis beyond that, in pixels squared.
     variance_px2: f64,
 }
@@ -104,7 +104,7 @@ impl Repeats {
         // The lens and the attitude of each direction follow a part of the error.
         let taken = fit.covariance.nrows() + 3 * self.direction_count();
         let left = 1.0 - taken as f64 / (2.0 * repeated as f64);
-        CommonError::of(&places, left.max(0.25))
+        CommonError::fit(&places, left.max(0.25))
     }
 
     /// The standard errors with which the stars of frames count, where `common` is in common and each alone has
@@ -217,9 +217,9 @@ struct Products {
 impl Products {
     fn add(&mut self, noise_px: f64, excess_px: f64, residual_px: [f64; 2]) {
         /// Standard errors beyond which a residual counts no more.
-        const MOST_SIGMAS: f64 = 2.5;
+        const MAX_SIGMAS: f64 = 2.5;
         let variance = noise_px * noise_px + excess_px * excess_px;
-        let most_px = MOST_SIGMAS * variance.sqrt();
+        let most_px = MAX_SIGMAS * variance.sqrt();
         let [x, y] = residual_px.map(|along| along.clamp(-most_px, most_px) / variance);
         let terms = [
             noise_px * noise_px / variance,
@@ -244,7 +244,7 @@ impl Products {
 impl CommonError {
     /// The least squares of s nᵢ nⱼ + v to the products of residuals, with n the noise, in the variances of
     /// these products. A fit took all but a part `left` of the error.
-    fn of(places: &[Products], left: f64) -> Self {
+    fn fit(places: &[Products], left: f64) -> Self {
         let mut total = [0.0; 7];
         for place in places {
             for (sum, product) in total.iter_mut().zip(place.products()) {
@@ -255,7 +255,7 @@ impl CommonError {
         let [aa, ab, bb] = [nn, n, one].map(|sum| 2.0 * sum);
         let vector = [nx + ny, x + y];
         let share = |[share, variance_px2]: [f64; 2]| Self {
-            noise_share: (share / left).clamp(0.0, 1.0),
+            noise_fraction: (share / left).clamp(0.0, 1.0),
             variance_px2: (variance_px2 / left).max(0.0),
         };
         let (both, determinant) = solve_pair([[aa, ab], [ab, bb]], vector);
@@ -270,7 +270,7 @@ impl CommonError {
 
     /// Standard error on each axis of stars whose centroids have an error of `noise_px`, in pixels.
     pub(super) fn sigma_px(&self, noise_px: f64) -> f64 {
-        (self.noise_share * noise_px * noise_px + self.variance_px2).sqrt()
+        (self.noise_fraction * noise_px * noise_px + self.variance_px2).sqrt()
     }
 }
 
@@ -298,7 +298,7 @@ mod tests {
             products
         };
         let places: Vec<Products> = (0..300).map(place).collect();
-        CommonError::of(&places, 1.0)
+        CommonError::fit(&places, 1.0)
     }
 
     #[test]
@@ -316,7 +316,7 @@ mod tests {
                 "{noise:?}"
             );
         }
-        let single = CommonError::of(&[Products::default()], 1.0);
+        let single = CommonError::fit(&[Products::default()], 1.0);
         assert_eq!(single, CommonError::default());
     }
 
@@ -330,7 +330,7 @@ mod tests {
             first_indices: vec![0, 1, 2],
         };
         let common = CommonError {
-            noise_share: 0.0,
+            noise_fraction: 0.0,
             variance_px2: 0.06 * 0.06,
         };
         let star = |residual_px| StarError {

@@ -27,7 +27,7 @@ pub struct ScaleDrift {
 
 impl FrameScale {
     /// The scale of a frame, with the distortion of `camera`.
-    pub(super) fn of(frame: &LensFrame, camera: &CameraModel, excess_sigma_px: f64) -> Self {
+    pub(super) fn fit(frame: &LensFrame, camera: &CameraModel, excess_sigma_px: f64) -> Self {
         let with_excess = |star: &MeasuredStar| MeasuredStar {
             sigma_px: libm::hypot(star.sigma_px, excess_sigma_px),
             ..*star
@@ -43,7 +43,7 @@ impl ScaleDrift {
     const DAYS_PER_YEAR: f64 = 365.25;
 
     /// The drift over the dates (Julian years) of frames; `None` if there are not two dates.
-    pub(super) fn of(frames: &[(f64, FrameScale)]) -> Option<Self> {
+    pub(super) fn fit(frames: &[(f64, FrameScale)]) -> Option<Self> {
         let known = frames.iter().filter(|(_, scale)| scale.sigma.is_finite());
         let known: Vec<(f64, FrameScale)> = known.copied().collect();
         let weight = |scale: &FrameScale| scale.sigma.powi(-2);
@@ -85,10 +85,10 @@ mod tests {
             let value = 3e-6 * f64::from(day) + error;
             (years, FrameScale { value, sigma: 1e-6 })
         };
-        let drift = ScaleDrift::of(&(0..40).map(scale).collect::<Vec<_>>()).unwrap();
+        let drift = ScaleDrift::fit(&(0..40).map(scale).collect::<Vec<_>>()).unwrap();
         assert!((drift.per_day - 3e-6).abs() < 3.0 * drift.sigma_per_day);
         assert!((0.8..1.2).contains(&drift.scatter), "{}", drift.scatter);
-        assert!(ScaleDrift::of(&[scale(1)]).is_none());
-        assert!(ScaleDrift::of(&[scale(1), scale(1)]).is_none());
+        assert!(ScaleDrift::fit(&[scale(1)]).is_none());
+        assert!(ScaleDrift::fit(&[scale(1), scale(1)]).is_none());
     }
 }

@@ -26,14 +26,14 @@ const FAINTER_MAG: f32 = 4.5;
 const REACH_SIGMAS: f64 = 4.5;
 /// The probability that a star is measured by its own light where one spot would take up that of
 /// its neighbors as well: the detector separates some stars that this model does not.
-const SEPARATED_SHARE: f64 = 0.05;
+const SEPARATED_FRACTION: f64 = 0.05;
 /// The detector does not separate a star whose own light is closer than this to the light of its
 /// blend, in standard deviations of the spot.
 const SEPARABLE_SIGMAS: f64 = 1.5;
 /// The probability that such a star is measured by its own light all the same: its neighbors in the
 /// catalogue are not there, or much fainter. It is small, so that a bright star cannot pull the
 /// attitude to where its own light agrees.
-const MISTAKEN_SHARE: f64 = 0.001;
+const MISTAKEN_FRACTION: f64 = 0.001;
 /// A star farther from the detection than this, in standard deviations of the spot, is outside the
 /// spot's half width at half maximum: its neighbors may be what was seen.
 const HALF_WIDTH_SIGMAS: f64 = 1.177;
@@ -167,7 +167,7 @@ impl Blends {
             for (index, candidate) in of_observed.iter_mut().enumerate() {
                 let is_absorbed = is_absorbed(&seen, index, view.variance_px2);
                 let Some(blend) = seen[index].blend else {
-                    candidate.share = if is_absorbed { 0.0 } else { 1.0 };
+                    candidate.probability = if is_absorbed { 0.0 } else { 1.0 };
                     continue;
                 };
                 // A saturated spot is measured too badly to say where in it a star is.
@@ -180,12 +180,12 @@ impl Blends {
                     |distance_px| position_density(candidate, distance_px, star.is_saturated);
                 let is_separable = candidate.light.distance_to(&blend.pixel) > separable_px;
                 let share = match (is_separable, is_absorbed) {
-                    (true, _) => SEPARATED_SHARE,
+                    (true, _) => SEPARATED_FRACTION,
                     (false, true) => 0.0,
-                    (false, false) => MISTAKEN_SHARE,
+                    (false, false) => MISTAKEN_FRACTION,
                 };
                 if is_absorbed || share * density(candidate.distance_px) > density(distance_px) {
-                    candidate.share = share;
+                    candidate.probability = share;
                 } else {
                     candidate.distance_px = distance_px;
                     candidate.light = blend.pixel;

@@ -31,7 +31,7 @@ pub struct NameCandidate {
     /// The largest distance of a candidate of this observed star, in pixels.
     pub gate_px: f64,
     /// Probability that a star among such neighbors is measured by this light.
-    pub share: f64,
+    pub probability: f64,
     /// Odds that another star of its blend was seen rather than this one.
     pub rivals: f64,
     /// Probability that it is no true pair.
@@ -53,7 +53,7 @@ impl NameCandidate {
             distance_px: near.distance_px,
             sigma_px,
             gate_px,
-            share: 1.0,
+            probability: 1.0,
             rivals: 0.0,
             p_chance: 1.0,
         }

@@ -25,7 +25,7 @@ const PRIOR_AROUND: f64 = 1.0;
 #[derive(Debug, Default)]
 pub struct DetectionProbabilities {
     /// By brightness alone, brightest first; at the end 0, for stars fainter than all.
-    shares: Vec<f64>,
+    fractions: Vec<f64>,
     /// How much more likely stars are observed at the place of each one than on average; as many.
     visibility: Vec<f64>,
     steps: Vec<CompletenessStep>,
@@ -64,16 +64,16 @@ pub fn odds_of(own: f64, apparent: f64, visibility: f64) -> [f64; 2] {
 impl DetectionProbabilities {
     /// Nothing is known of `stars` predicted stars.
     pub fn start(&mut self, stars: usize) {
-        self.shares.clear();
-        self.shares.resize(stars, 0.5);
-        self.shares.push(0.0);
+        self.fractions.clear();
+        self.fractions.resize(stars, 0.5);
+        self.fractions.push(0.0);
         self.visibility.clear();
         self.visibility.resize(stars + 1, 1.0);
     }
 
     /// The share by brightness, and the visibility, of each predicted star, and of one fainter than all.
-    pub fn shares_and_visibility(&self) -> (&[f64], &[f64]) {
-        (&self.shares, &self.visibility)
+    pub fn fractions_and_visibility(&self) -> (&[f64], &[f64]) {
+        (&self.fractions, &self.visibility)
     }
 
     /// Finds the places of `predicted`, for the visibility.
@@ -95,13 +95,13 @@ impl DetectionProbabilities {
         self.visibility.resize(is_observed.len() + 1, 1.0);
         for (scale, cells) in self.scales.iter_mut().zip(CELLS) {
             let grid = FrameGrid::new(field, cells);
-            scale.count(&grid, is_observed, &self.shares, &mut self.scratch);
-            scale.refine(&mut self.visibility, is_observed, &self.shares);
+            scale.count(&grid, is_observed, &self.fractions, &mut self.scratch);
+            scale.refine(&mut self.visibility, is_observed, &self.fractions);
         }
     }
 
     /// Measures the share by brightness, by the probability of each star that it is observed.
-    pub fn measure_shares(&mut self, is_observed: &[f64]) {
+    pub fn measure_fractions(&mut self, is_observed: &[f64]) {
         self.steps.clear();
         for &observed in is_observed {
             match self.steps.last_mut() {
@@ -110,13 +110,13 @@ impl DetectionProbabilities {
                 _ => self.add_step(observed.min(1.0)),
             }
         }
-        self.shares.clear();
+        self.fractions.clear();
         for &CompletenessStep { stars, observed } in &self.steps {
             let share = (observed + 0.5 * PRIOR_STARS) / (stars + PRIOR_STARS);
-            let end = self.shares.len() + stars as usize;
-            self.shares.resize(end, share);
+            let end = self.fractions.len() + stars as usize;
+            self.fractions.resize(end, share);
         }
-        self.shares.push(0.0);
+        self.fractions.push(0.0);
     }
 
     /// Adds a star, and pools the steps that rise.
@@ -205,17 +205,17 @@ mod tests {
     fn the_share_falls_and_pools_what_rises() {
         let mut found = DetectionProbabilities::default();
         let observed: Vec<f64> = [[1.0; 40], [0.0; 40]].concat();
-        found.measure_shares(&observed);
-        assert!(found.shares[0] > 0.95);
-        assert!(found.shares[79] < 0.02);
+        found.measure_fractions(&observed);
+        assert!(found.fractions[0] > 0.95);
+        assert!(found.fractions[79] < 0.02);
         // One of two, in whatever order it rises: 1/2 of each.
         let rising: Vec<f64> = (0..80).map(|i| f64::from(i % 2)).collect();
-        found.measure_shares(&rising);
-        assert!(found.shares.windows(2).all(|pair| pair[0] >= pair[1]));
+        found.measure_fractions(&rising);
+        assert!(found.fractions.windows(2).all(|pair| pair[0] >= pair[1]));
         assert!(
-            (found.shares[40] - 0.5).abs() < 0.03,
+            (found.fractions[40] - 0.5).abs() < 0.03,
             "{}",
-            found.shares[40]
+            found.fractions[40]
         );
     }
 
@@ -228,10 +228,10 @@ mod tests {
             .map(|s| f64::from(u8::from(!is_behind(s))))
             .collect();
         let mut found = DetectionProbabilities::default();
-        found.measure_shares(&observed);
+        found.measure_fractions(&observed);
         found.place(&field(), &stars);
         found.measure_visibility(&field(), &observed);
-        let (shares, visibility) = found.shares_and_visibility();
+        let (shares, visibility) = found.fractions_and_visibility();
         for (index, star) in stars.iter().enumerate() {
             let [odds, _] = odds_of(shares[index], 0.0, visibility[index]);
             if star.pixel.x > 900.0 {

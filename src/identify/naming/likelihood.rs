@@ -10,22 +10,22 @@ use std::f64::consts::PI;
 
 /// Position: most true pairs have the stated errors, some have larger ones (unresolved companions,
 /// the catalogue's own errors), a few are far off (saturated, bloomed).
-const WIDE_SHARE: f64 = 0.04;
+const WIDE_FRACTION: f64 = 0.04;
 const WIDE_SIGMAS: f64 = 4.0;
-const FAR_SHARE: f64 = 0.01;
+const FAR_FRACTION: f64 = 0.01;
 /// Share of the saturated stars that are far off.
-const FAR_SHARE_SATURATED: f64 = 0.2;
+const FAR_FRACTION_SATURATED: f64 = 0.2;
 /// Standard deviation of those on each axis, in units of the gate.
 const FAR_SIGMA: f64 = 0.4;
 /// Magnitude: most true pairs have the frame's scatter, some have this many times it (variable
 /// stars, unusual colors, blends).
-const OUTLIER_SHARE: f64 = 0.1;
+const OUTLIER_FRACTION: f64 = 0.1;
 const OUTLIER_SCATTER: f64 = 3.0;
 /// Scatter of the magnitudes before it is measured, and the smallest.
 const FIRST_SCATTER_MAG: f64 = 0.6;
 const MIN_SCATTER_MAG: f64 = 0.15;
 /// Share of saturated stars that are brighter than measured, by up to this many magnitudes.
-const BRIGHTER_SHARE: f64 = 0.5;
+const BRIGHTER_FRACTION: f64 = 0.5;
 const BRIGHTER_MAG: f64 = 6.0;
 /// Standard deviation of the slope of catalogue over observed magnitudes about 1, before it is
 /// measured: tone curves of JPEGs compress light.
@@ -69,10 +69,10 @@ pub fn position_densities<const N: usize>(
     let density = |share: f64, variance: f64, falloff: f64| share * falloff / (2.0 * PI * variance);
     let mut densities = [0.0; N];
     for n in 0..N {
-        let far_share = FAR_SHARE + saturated[n] * (FAR_SHARE_SATURATED - FAR_SHARE);
+        let far_share = FAR_FRACTION + saturated[n] * (FAR_FRACTION_SATURATED - FAR_FRACTION);
         let narrow = wide[n].powi(WIDE_ROOT);
-        densities[n] = density(1.0 - WIDE_SHARE - far_share, sigmas_sq[n], narrow)
-            + density(WIDE_SHARE, sigmas_sq[n] * WIDE_SIGMAS.powi(2), wide[n])
+        densities[n] = density(1.0 - WIDE_FRACTION - far_share, sigmas_sq[n], narrow)
+            + density(WIDE_FRACTION, sigmas_sq[n] * WIDE_SIGMAS.powi(2), wide[n])
             + density(far_share, far_sq[n], far[n]);
     }
     densities
@@ -142,18 +142,18 @@ impl MagnitudeRelation {
         let density = |share: f64, sigma: f64, falloff: f64| share * falloff / (ROOT_TAU * sigma);
         let (mut by_scatter, mut otherwise) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            let as_measured = 1.0 - BRIGHTER_SHARE * packed.saturated[lane];
+            let as_measured = 1.0 - BRIGHTER_FRACTION * packed.saturated[lane];
             let (outlier, difference) = (of_outliers[lane], differences[lane]);
             let is_brighter = (-BRIGHTER_MAG..0.0).contains(&difference);
             let brighter = if is_brighter {
-                BRIGHTER_SHARE / BRIGHTER_MAG
+                BRIGHTER_FRACTION / BRIGHTER_MAG
             } else {
                 0.0
             };
             // Of three times the scatter: the exponential is the ninth root.
-            let plain = density(1.0 - OUTLIER_SHARE, self.scatter_mag, outlier.powi(9));
+            let plain = density(1.0 - OUTLIER_FRACTION, self.scatter_mag, outlier.powi(9));
             by_scatter[lane] = as_measured * plain;
-            otherwise[lane] = as_measured * density(OUTLIER_SHARE, outlying, outlier)
+            otherwise[lane] = as_measured * density(OUTLIER_FRACTION, outlying, outlier)
                 + packed.saturated[lane] * brighter;
         }
         MagnitudeDensities {

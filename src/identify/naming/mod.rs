@@ -55,8 +55,8 @@ const GATE_SIGMAS: f64 = 10.0;
 /// observed one lies within that distance: saturated and bloomed stars are measured badly, …
 const GATE_CHANCE: f64 = 0.01;
 /// … but always within these fractions of the frame's diagonal.
-const ERROR_GATE_SHARE: f64 = 0.005;
-const RARE_GATE_SHARE: f64 = 0.01;
+const ERROR_GATE_FRACTION: f64 = 0.005;
+const RARE_GATE_FRACTION: f64 = 0.01;
 
 /// Computes the probabilities of names. Its buffers are reused.
 #[derive(Debug, Default)]
@@ -74,7 +74,7 @@ pub struct Naming {
     /// V magnitudes of the predicted stars.
     v_mags: Vec<f64>,
     /// The share by brightness of the predicted stars as bright as each observed one.
-    apparent_shares: Vec<f64>,
+    apparent_fractions: Vec<f64>,
     by_place: bool,
     completeness: DetectionProbabilities,
     unrelated: Unrelated,
@@ -166,12 +166,12 @@ impl Naming {
     fn expect(&mut self, stars: NamingStars) {
         let (observed, predicted) = (stars.field.stars.len(), stars.predicted.len());
         self.unrelated.measure(&self.has_name[..observed]);
-        self.find_apparent_shares(stars.field);
-        let (shares, visibility) = self.completeness.shares_and_visibility();
+        self.find_apparent_fractions(stars.field);
+        let (shares, visibility) = self.completeness.fractions_and_visibility();
         let known = OddsInputs {
-            shares,
+            fractions: shares,
             visibility,
-            apparent_shares: &self.apparent_shares,
+            apparent_fractions: &self.apparent_fractions,
             unrelated: self.unrelated.densities(),
             magnitudes: &self.magnitudes,
         };
@@ -197,30 +197,31 @@ impl Naming {
     }
 
     /// Finds the share by brightness of the predicted stars as bright as each observed one.
-    fn find_apparent_shares(&mut self, field: &StarField) {
-        let (shares, _) = self.completeness.shares_and_visibility();
+    fn find_apparent_fractions(&mut self, field: &StarField) {
+        let (shares, _) = self.completeness.fractions_and_visibility();
         let v_mags = &self.v_mags;
-        self.apparent_shares.clear();
+        self.apparent_fractions.clear();
         // Both are sorted, so each search begins where the last one ended.
         let mut at = 0;
-        self.apparent_shares.extend(field.stars.iter().map(|star| {
-            let expected_v_mag = self.magnitudes.expected_v_mag(star.mag);
-            while at < v_mags.len() && v_mags[at] < expected_v_mag {
-                at += 1;
-            }
-            while at > 0 && v_mags[at - 1] >= expected_v_mag {
-                at -= 1;
-            }
-            shares[at]
-        }));
-        self.apparent_shares.push(0.0);
+        self.apparent_fractions
+            .extend(field.stars.iter().map(|star| {
+                let expected_v_mag = self.magnitudes.expected_v_mag(star.mag);
+                while at < v_mags.len() && v_mags[at] < expected_v_mag {
+                    at += 1;
+                }
+                while at > 0 && v_mags[at - 1] >= expected_v_mag {
+                    at -= 1;
+                }
+                shares[at]
+            }));
+        self.apparent_fractions.push(0.0);
     }
 
     /// What the frame shows, from the probabilities.
     fn maximise(&mut self, stars: NamingStars, is_by_place: bool) {
         let NamingStars { field, predicted } = stars;
         let is_observed = &self.is_observed[..predicted.len()];
-        self.completeness.measure_shares(is_observed);
+        self.completeness.measure_fractions(is_observed);
         if is_by_place {
             self.completeness.measure_visibility(field, is_observed);
         }
@@ -255,8 +256,8 @@ impl Gate {
     fn radius_px(&self, rank: usize, star: &ObservedStar) -> f64 {
         let by_error_px = GATE_SIGMAS * self.sigma_px(star);
         let by_rarity_px = self.rare_px / ((rank + 1) as f64).sqrt();
-        let by_error_px = by_error_px.min(ERROR_GATE_SHARE * self.diagonal_px);
-        let by_rarity_px = by_rarity_px.min(RARE_GATE_SHARE * self.diagonal_px);
+        let by_error_px = by_error_px.min(ERROR_GATE_FRACTION * self.diagonal_px);
+        let by_rarity_px = by_rarity_px.min(RARE_GATE_FRACTION * self.diagonal_px);
         by_error_px.max(by_rarity_px)
     }
 }

@@ -12,11 +12,11 @@ use multiversion::multiversion;
 pub struct OddsInputs<'a> {
     /// The share by brightness of each predicted star, and its visibility. Here and below, there is
     /// one more for empty lanes.
-    pub shares: &'a [f64],
+    pub fractions: &'a [f64],
     pub visibility: &'a [f64],
     /// The share by brightness of the predicted stars as bright as each observed star, and the
     /// density of unrelated detections there.
-    pub apparent_shares: &'a [f64],
+    pub apparent_fractions: &'a [f64],
     pub unrelated: &'a [f64],
     pub magnitudes: &'a MagnitudeRelation,
 }
@@ -57,7 +57,7 @@ fn packed_from(candidates: &[NameCandidate], field: &StarField, predicted: usize
         packed.saturated[lane] = f64::from(u8::from(star.is_saturated));
         distances_px[lane] = candidate.distance_px;
         (sigmas_px[lane], gates_px[lane]) = (candidate.sigma_px, candidate.gate_px);
-        shares[lane] = candidate.share;
+        shares[lane] = candidate.probability;
         packed.rivals[lane] = candidate.rivals;
     }
     let of_true = in_lanes(&distances_px, &sigmas_px, &gates_px, &packed.saturated);
@@ -78,8 +78,8 @@ pub fn set_odds(candidates: &mut [Packed], known: &OddsInputs) {
     for packed in candidates {
         let [mut shares, mut apparent, mut visibility, mut unrelated] = [[0.0; LANES]; 4];
         for (lane, (observed, predicted)) in packed.places().enumerate() {
-            shares[lane] = known.shares[predicted];
-            apparent[lane] = known.apparent_shares[observed];
+            shares[lane] = known.fractions[predicted];
+            apparent[lane] = known.apparent_fractions[observed];
             visibility[lane] = known.visibility[predicted];
             unrelated[lane] = known.unrelated[observed];
         }

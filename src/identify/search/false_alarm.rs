@@ -32,7 +32,7 @@ const TRIANGLE_STARS: usize = 3;
 /// the frame's diagonal.
 const MIN_RADIUS_PX: f64 = 0.2;
 const RADIUS_FACTOR: f64 = 1.5;
-const MAX_RADIUS_SHARE: f64 = 0.014;
+const MAX_RADIUS_FRACTION: f64 = 0.014;
 /// Magnitude differences tried, besides the largest that is tolerated.
 const MAG_TOLERANCES: [f64; 3] = [0.25, 0.5, 1.0];
 /// Radius of the neighborhood in which the density of predicted stars is measured, in units of the
@@ -155,7 +155,7 @@ impl FalseAlarm {
     }
 
     fn set_radii(&mut self, field: &StarField) {
-        let largest_px = MAX_RADIUS_SHARE * libm::hypot(field.width_px, field.height_px);
+        let largest_px = MAX_RADIUS_FRACTION * libm::hypot(field.width_px, field.height_px);
         // At least one radius, also in the smallest frame.
         let largest_px = largest_px.max(MIN_RADIUS_PX);
         let radii =

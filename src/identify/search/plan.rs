@@ -28,7 +28,7 @@ pub struct SearchPass {
     /// are not in the catalogue.
     pub true_confirmation: f64,
     /// Largest longest side of a triangle, in units of the frame's diagonal.
-    pub largest_share: f64,
+    pub largest_side: f64,
 }
 
 /// What a search tries.
@@ -112,13 +112,13 @@ pub const PASSES: [SearchPass; 2] = [
         stars: 12,
         tolerance: 0.0025,
         true_confirmation: 0.6,
-        largest_share: f64::INFINITY,
+        largest_side: f64::INFINITY,
     },
     SearchPass {
         stars: 10,
         tolerance: 0.008,
         true_confirmation: 0.6,
-        largest_share: f64::INFINITY,
+        largest_side: f64::INFINITY,
     },
 ];
 
@@ -139,6 +139,6 @@ const fn votes_of(stars: usize, largest_share: f64) -> SearchPass {
         stars,
         tolerance: 0.0025,
         true_confirmation: 0.25,
-        largest_share,
+        largest_side: largest_share,
     }
 }

@@ -46,7 +46,7 @@ pub struct CameraAxes {
 
 impl CameraAxes {
     /// Those of a triangle.
-    pub fn of(in_camera: Option<&InCamera>) -> Self {
+    pub fn new(in_camera: Option<&InCamera>) -> Self {
         let Some(InCamera { frames, triple }) = in_camera else {
             return Self {
                 axes: [[f32::NAN; 6]; 2],

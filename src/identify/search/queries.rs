@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// Centroid errors in a triangle's tolerance, in standard errors.
 const CENTROID_SIGMAS: f64 = 2.0;
 /// Smallest longest side of a triangle, in units of the frame's diagonal.
-const MIN_TRIANGLE_SHARE: f64 = 0.12;
+const MIN_TRIANGLE_FRACTION: f64 = 0.12;
 /// Largest distance of a confirming star from its catalogue star: in distortion tolerances times
 /// the frame's diagonal, and in centroid errors extrapolated from the triangle.
 const CONFIRMING_TOLERANCES: f64 = 1.5;
@@ -121,7 +121,7 @@ impl ObservedStars<'_> {
         let offsets @ [a, b, c] = stars.map(|star| self.offset(star));
         let side = |p: [f64; 2], q: [f64; 2]| libm::hypot(p[0] - q[0], p[1] - q[1]);
         let longest_px = side(a, b).max(side(b, c)).max(side(c, a));
-        let shares = MIN_TRIANGLE_SHARE..=pass.largest_share;
+        let shares = MIN_TRIANGLE_FRACTION..=pass.largest_side;
         if !shares.contains(&(longest_px / self.diagonal_px)) {
             return None;
         }

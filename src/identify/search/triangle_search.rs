@@ -184,7 +184,7 @@ impl<'a> TriangleSearch<'a> {
         seed.clear();
         seed.extend(refiner.pairs.iter().map(|pair| {
             let star = &window.field.stars[pair.observed];
-            let measured = MeasuredStar::of(star, pair, refined.excess_sigma_px);
+            let measured = MeasuredStar::new(star, pair, refined.excess_sigma_px);
             MeasuredStar {
                 pixel: window.in_frame(&star.position),
                 ..measured
@@ -199,7 +199,7 @@ impl<'a> TriangleSearch<'a> {
     /// where the lens predicts them, and can hold it there.
     pub fn followed_outwards(&mut self, problem: Problem, answer: &Refined) -> Option<Hypothesis> {
         /// Detections farther out than the named stars, over these, below which they are no reason.
-        const LEAST_BEYOND: f64 = 0.05;
+        const MIN_BEYOND: f64 = 0.05;
         /// The part of the named stars, as an angle from the axis, that the lens is followed from.
         const MIDDLE: f64 = 0.9;
         let hypothesis = answer.hypothesis();
@@ -226,7 +226,7 @@ impl<'a> TriangleSearch<'a> {
         };
         let beyond = stars.iter().filter(is_beyond).count();
         if camera.radius_rad() < WIDE_RAD
-            || (beyond as f64) < LEAST_BEYOND * refiner.pairs.len() as f64
+            || (beyond as f64) < MIN_BEYOND * refiner.pairs.len() as f64
         {
             return None;
         }
@@ -235,7 +235,7 @@ impl<'a> TriangleSearch<'a> {
         let of_middle = of_middle.filter(|pair| angle_rad(pair) < MIDDLE * outermost_rad);
         let measured = |pair: &Pair| {
             let star = &stars[pair.observed];
-            MeasuredStar::of(star, pair, answer.excess_sigma_px)
+            MeasuredStar::new(star, pair, answer.excess_sigma_px)
         };
         seed.extend(of_middle.map(measured));
         growth.grow(problem, &Seed::of_middle(&hypothesis, seed))
@@ -261,8 +261,8 @@ impl<'a> TriangleSearch<'a> {
     /// [`Self::adopt`] with so many stars.
     fn adopt_with(&mut self, hypothesis: &Hypothesis, stars: usize) -> Option<FoundHypothesis> {
         /// Largest distance of true pairs, in diagonals of the frame.
-        const RADIUS_SHARE: f64 = 0.002;
-        let radius_px = RADIUS_SHARE * self.observed.diagonal_px;
+        const RADIUS_FRACTION: f64 = 0.002;
+        let radius_px = RADIUS_FRACTION * self.observed.diagonal_px;
         let start = Start {
             hypothesis,
             radius_px,
@@ -367,7 +367,7 @@ impl<'a> TriangleSearch<'a> {
             in_camera.clear();
             in_camera.extend(of_triangle.iter().map(|query| {
                 let vectors = self.observed.vectors(&query.triangle, query.middle_px);
-                CameraAxes::of(InCamera::new(&vectors).as_ref())
+                CameraAxes::new(InCamera::new(&vectors).as_ref())
             }));
             let stars = &self.observed.sky.vectors;
             votes.add_all(in_camera, &looked_up.similar, first as u32, stars);

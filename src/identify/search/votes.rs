@@ -224,7 +224,7 @@ mod tests {
         let camera = [[0.1, 0.2], [-0.2, 0.1], [0.3, -0.1]]
             .map(|[x, y]| Vector3::new(x, y, 1.0).normalize());
         let sky = camera.map(|v| rotation.matrix().transpose() * v);
-        let axes = CameraAxes::of(InCamera::new(&camera).as_ref());
+        let axes = CameraAxes::new(InCamera::new(&camera).as_ref());
         let mut alignments = Alignments::default();
         let sky = sky.map(|v| [v.x, v.y, v.z].map(|x| x as f32));
         alignments.set(0, sky, &axes, focal_px.ln() as f32);

@@ -75,7 +75,7 @@ pub struct Windows(Vec<SearchWindow>);
 
 impl Windows {
     /// The windows of `field` that have stars enough.
-    pub fn of(&mut self, field: &StarField) -> &[SearchWindow] {
+    pub fn cut(&mut self, field: &StarField) -> &[SearchWindow] {
         let shorter_px = field.width_px.min(field.height_px);
         let mut count = 0;
         for ([x, y], side) in WINDOWS {
@@ -144,7 +144,7 @@ mod tests {
             .collect();
         let field = StarField::of_places([1000.0, 800.0], &places);
         let mut windows = Windows::default();
-        let all = windows.of(&field);
+        let all = windows.cut(&field);
         assert_eq!(all.len(), 10, "the smallest has too few");
         for window in all {
             assert!(window.field.stars.windows(2).all(|w| w[0].mag < w[1].mag));
@@ -162,6 +162,6 @@ mod tests {
     fn windows_with_few_stars_are_left_out() {
         let places: Vec<_> = (0..9).map(|i| (480.0 + f64::from(i), 390.0)).collect();
         let field = StarField::of_places([1000.0, 800.0], &places);
-        assert_eq!(Windows::default().of(&field).len(), 2);
+        assert_eq!(Windows::default().cut(&field).len(), 2);
     }
 }

@@ -44,7 +44,7 @@ pub struct Parabola {
 
 impl IsoLine {
     /// The line of an error, from the curves at the noises of the grid, where they exist.
-    pub fn of(errors: &ErrorGrid, curves: &[Option<ErrorCurve>], rms_px: f64) -> Self {
+    pub fn trace(errors: &ErrorGrid, curves: &[Option<ErrorCurve>], rms_px: f64) -> Self {
         let points: Vec<_> = errors
             .grid
             .noises

@@ -63,7 +63,7 @@ impl PeakStudy {
         let trial = |_| {
             let truth = [(); 2].map(|()| random.random::<f64>() - 0.5);
             for (axis, shares) in shares.iter_mut().enumerate() {
-                self.shares(spot_px, truth[axis], shares);
+                self.fractions(spot_px, truth[axis], shares);
             }
             let [columns, rows] = &shares;
             let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
@@ -86,7 +86,7 @@ impl PeakStudy {
 
     /// Fractions of the light in the columns or rows of the window, for a spot at `at` from its
     /// centre.
-    fn shares(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
+    fn fractions(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
         let edge = |pixel: usize| (pixel as f64 - self.half_window_px as f64 - 0.5 - at) / spot_px;
         let mut before = normal_cdf(edge(0));
         into.clear();
@@ -100,7 +100,7 @@ impl PeakStudy {
 
     /// The same for a Gaussian that is sampled in the middle of each pixel instead of integrated.
     #[doc(alias = "SPSF")]
-    fn sampled_shares(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
+    fn sampled_fractions(&self, spot_px: f64, at: f64, into: &mut Vec<f64>) {
         let offset = |pixel: usize| pixel as f64 - self.half_window_px as f64 - at;
         let density = |pixel: usize| normal_density(offset(pixel) / spot_px) / spot_px;
         into.clear();
@@ -111,7 +111,7 @@ impl PeakStudy {
     /// row by row: eqs. (1) and (2).
     pub fn pixels(&self, spot_px: f64) -> Vec<f64> {
         let mut shares = Vec::with_capacity(self.window_px());
-        self.shares(spot_px, 0.0, &mut shares);
+        self.fractions(spot_px, 0.0, &mut shares);
         let energy = self.energy(spot_px);
         let mut pixels = Vec::with_capacity(shares.len().pow(2));
         for row in &shares {
@@ -127,7 +127,7 @@ impl PeakStudy {
 
     /// A spot of this radius in pixels in the window, for any noise.
     pub fn spot(&self, spot_px: f64) -> SpotInWindow {
-        self.spot_of(spot_px, Self::shares)
+        self.spot_of(spot_px, Self::fractions)
     }
 
     /// The same light in a spot whose Gaussian is sampled in the middle of each pixel instead of
@@ -136,7 +136,7 @@ impl PeakStudy {
     /// # Reference
     /// Wang et al. 2019, section 2: SPSF, where [`Self::spot`] is IPSF.
     pub fn sampled_spot(&self, spot_px: f64) -> SpotInWindow {
-        self.spot_of(spot_px, Self::sampled_shares)
+        self.spot_of(spot_px, Self::sampled_fractions)
     }
 
     fn spot_of(&self, spot_px: f64, shares: Shares) -> SpotInWindow {
@@ -159,8 +159,8 @@ impl PeakStudy {
         let mut squares = 0.0;
         for (at_x, at_y) in (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (place(x), place(y))))
         {
-            self.shares(spot_px, at_x, &mut columns);
-            self.shares(spot_px, at_y, &mut rows);
+            self.fractions(spot_px, at_x, &mut columns);
+            self.fractions(spot_px, at_y, &mut rows);
             let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
             for (y, row) in rows.iter().enumerate() {
                 let y = y as f64 - half;
@@ -281,7 +281,7 @@ mod tests {
         let study = PeakStudy::default();
         for spot_px in [0.4, 1.0, 2.4] {
             let mut shares = Vec::new();
-            study.shares(spot_px, 0.0, &mut shares);
+            study.fractions(spot_px, 0.0, &mut shares);
             let peak = study.energy(spot_px) * shares[7] * shares[7];
             assert!((peak - 0.675).abs() < 1e-12, "{spot_px}: {peak}");
         }
@@ -295,7 +295,7 @@ mod tests {
         };
         for spot_px in [0.1, 0.25, 0.4, 0.7] {
             for at in [-0.5, -0.37, -0.1, 0.0, 0.2, 0.25, 0.44] {
-                let found = study.sums(spot_px, at, PeakStudy::shares).mean - at;
+                let found = study.sums(spot_px, at, PeakStudy::fractions).mean - at;
                 let series = sampling_bias_px(spot_px, at);
                 assert!(
                     (found - series).abs() < 1e-12,

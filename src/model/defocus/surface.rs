@@ -82,7 +82,7 @@ impl Surface {
                 trials,
             });
         }
-        let (Some(along), Some(across)) = (ScaledAxis::of(spots), ScaledAxis::of(noises)) else {
+        let (Some(along), Some(across)) = (ScaledAxis::new(spots), ScaledAxis::new(noises)) else {
             return Err(too_few);
         };
         let values = errors.points.iter().map(|point| point.rms_px);
@@ -144,7 +144,7 @@ struct ScaledAxis {
 }
 
 impl ScaledAxis {
-    fn of(values: &[f64]) -> Option<Self> {
+    fn new(values: &[f64]) -> Option<Self> {
         let (first, last) = (*values.first()?, *values.last()?);
         (values.len() >= TERMS && last > first).then(|| Self {
             middle: 0.5 * (first + last),

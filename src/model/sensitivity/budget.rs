@@ -124,7 +124,7 @@ impl Budget {
     /// The budget of a scenario that passes [`Scenario::check`].
     pub fn new(scenario: &Scenario) -> Self {
         let (sheet, conditions) = (&scenario.camera, &scenario.conditions);
-        let light = SpectralSums::of(scenario);
+        let light = SpectralSums::compute(scenario);
         let exposure_s = conditions.exposure_s;
         let aperture_area_m2 = sheet.aperture_area_m2();
         let collected = aperture_area_m2 * exposure_s;
@@ -259,7 +259,7 @@ struct SpectralSums {
 }
 
 impl SpectralSums {
-    fn of(scenario: &Scenario) -> Self {
+    fn compute(scenario: &Scenario) -> Self {
         let conditions = &scenario.conditions;
         let zenith_distance_deg = conditions.zenith_distance_deg;
         let airmass = match scenario.reading {

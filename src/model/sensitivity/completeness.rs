@@ -76,7 +76,7 @@ impl Detector {
     /// The paper's rule.
     fn peak_pixel(scenario: &Scenario, budget: &Budget) -> Self {
         let threshold_e = budget.star_e;
-        let spot = SmearedSpot::of(scenario);
+        let spot = SmearedSpot::from_scenario(scenario);
         let filter = Filter {
             half_kernel: vec![1.0],
             threshold_e,
@@ -95,7 +95,7 @@ impl Detector {
 
     /// The matched filter with the threshold of `config`; the spot is the scenario's.
     pub fn matched_filter(config: &DetectConfig, scenario: &Scenario, budget: &Budget) -> Self {
-        let spot = SmearedSpot::of(scenario);
+        let spot = SmearedSpot::from_scenario(scenario);
         let size = Size::new(scenario.camera.width_px, scenario.camera.height_px);
         let electrons = budget.background_e + budget.dark_e;
         let skewness = electrons / budget.background_noise_e.powi(3);
@@ -113,7 +113,7 @@ impl Detector {
         budget: &Budget,
     ) -> Self {
         let size = Size::new(scenario.camera.width_px, scenario.camera.height_px);
-        let spot_px = SmearedSpot::of(scenario).round_sigma_px();
+        let spot_px = SmearedSpot::from_scenario(scenario).round_sigma_px();
         let model = FilterModel {
             threshold_sigma,
             ..FilterModel::new(config, size, spot_px, 0.0)
@@ -139,7 +139,7 @@ impl Detector {
         scenario: &Scenario,
         budget: &Budget,
     ) -> Self {
-        let spot = SmearedSpot::of(scenario);
+        let spot = SmearedSpot::from_scenario(scenario);
         let filter = Filter {
             half_kernel: model.half_kernel,
             threshold_e: model.threshold_sigma * noise_e,
@@ -190,7 +190,7 @@ struct SmearedSpot {
 }
 
 impl SmearedSpot {
-    fn of(scenario: &Scenario) -> Self {
+    fn from_scenario(scenario: &Scenario) -> Self {
         Self {
             sigma_px: scenario.camera.spot_sigma_px,
             smear_px: scenario.conditions.motion_px,

@@ -35,7 +35,7 @@ impl CramerRao {
         const REACH_SIGMAS: f64 = 6.0;
         let reach = (REACH_SIGMAS * spot_sigma_px).ceil() as i32 + 2;
         let profile = |middle: f64| -> Vec<[f64; 2]> {
-            let at = |pixel: i32| share_and_slope(f64::from(pixel) - middle, spot_sigma_px);
+            let at = |pixel: i32| fraction_and_slope(f64::from(pixel) - middle, spot_sigma_px);
             (-reach..=reach).map(at).collect()
         };
         let [columns, rows] = offset_px.map(profile);
@@ -64,7 +64,7 @@ impl CramerRao {
 
 /// The fraction of the light in a pixel at `offset_px` from the centre of the spot, and its
 /// derivative with respect to the spot's position.
-fn share_and_slope(offset_px: f64, sigma_px: f64) -> [f64; 2] {
+fn fraction_and_slope(offset_px: f64, sigma_px: f64) -> [f64; 2] {
     let [low, high] = [-0.5, 0.5].map(|half| (offset_px + half) / sigma_px);
     [
         normal_cdf(high) - normal_cdf(low),

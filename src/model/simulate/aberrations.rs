@@ -11,7 +11,7 @@ pub(super) struct Ray {
     /// Displacement along x and y, in pixels.
     pub offset_px: [f64; 2],
     /// Share of the light.
-    pub share: f64,
+    pub fraction: f64,
 }
 
 /// The rays of a star at any position. Their centre of light is the position.
@@ -30,7 +30,7 @@ pub(super) struct Aberrations {
 }
 
 impl Aberrations {
-    pub fn of(sheet: &DataSheet) -> Self {
+    pub fn from_sheet(sheet: &DataSheet) -> Self {
         let made = &sheet.imperfections;
         let [width, height] = [sheet.width_px, sheet.height_px].map(|side| side as f64);
         let stretch = made.spot_axis_ratio.sqrt();
@@ -92,7 +92,7 @@ impl Aberrations {
             ];
             rays.extend(self.elongation.iter().map(|along| Ray {
                 offset_px: [x + along.offset_px[0], y + along.offset_px[1]],
-                share: share * along.share,
+                fraction: share * along.fraction,
             }));
         }
     }
@@ -110,7 +110,7 @@ fn elongation(major_sigma_px: f64, minor_sigma_px: f64, angle_rad: f64) -> Vec<R
     if sigma_px < 1e-6 * minor_sigma_px {
         return vec![Ray {
             offset_px: [0.0; 2],
-            share: 1.0,
+            fraction: 1.0,
         }];
     }
     let last = (REACH_SIGMAS * sigma_px / step_px).ceil() as i32;
@@ -121,7 +121,7 @@ fn elongation(major_sigma_px: f64, minor_sigma_px: f64, angle_rad: f64) -> Vec<R
         let along_px = f64::from(step) * step_px;
         Ray {
             offset_px: [along_px * cos, along_px * sin],
-            share: weight(step) / sum,
+            fraction: weight(step) / sum,
         }
     };
     (-last..=last).map(ray).collect()
@@ -150,7 +150,8 @@ mod tests {
     fn moments(aberrations: &Aberrations, at: &PixelPoint) -> (usize, [f64; 2], [f64; 3]) {
         let mut rays = Vec::new();
         aberrations.trace(at, &mut rays);
-        let sum = |f: &dyn Fn(&Ray) -> f64| rays.iter().map(|ray| ray.share * f(ray)).sum::<f64>();
+        let sum =
+            |f: &dyn Fn(&Ray) -> f64| rays.iter().map(|ray| ray.fraction * f(ray)).sum::<f64>();
         let at = |axis: usize| move |ray: &Ray| ray.offset_px[axis];
         let product = |i: usize, j: usize| move |ray: &Ray| ray.offset_px[i] * ray.offset_px[j];
         let second = [
@@ -168,7 +169,7 @@ mod tests {
         sheet.spot_sigma_px = 1.2;
         sheet.imperfections.spot_axis_ratio = 2.0;
         sheet.imperfections.spot_angle_deg = 90.0;
-        let aberrations = Aberrations::of(&sheet);
+        let aberrations = Aberrations::from_sheet(&sheet);
         let minor2 = aberrations.ray_sigma_px().powi(2);
         let (_, centre, [xx, yy, xy]) = moments(&aberrations, &PixelPoint::new(10.0, 20.0));
         assert!(centre.iter().all(|at| at.abs() < 1e-12));
@@ -182,7 +183,7 @@ mod tests {
         let mut sheet = Preset::Experiment1.data_sheet();
         let made = &mut sheet.imperfections;
         (made.coma_px, made.field_curvature_px) = (6.0, 2.0);
-        let aberrations = Aberrations::of(&sheet);
+        let aberrations = Aberrations::from_sheet(&sheet);
         let middle = aberrations.centre;
         assert_eq!(moments(&aberrations, &middle).0, 1);
         let (_, centre, [xx, ..]) = moments(&aberrations, &PixelPoint::new(0.0, 0.0));

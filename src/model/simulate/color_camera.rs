@@ -25,7 +25,7 @@ pub(super) struct ColorCamera {
 
 impl ColorCamera {
     /// The camera's processing, if it has any, of frames whose background has this level and noise.
-    pub fn of(
+    pub fn new(
         made: &Imperfections,
         level_adu: f64,
         noise_adu: f64,
@@ -178,8 +178,8 @@ mod tests {
             tone_gamma: 2.2,
             ..Imperfections::default()
         };
-        assert!(ColorCamera::of(&Imperfections::default(), 100.0, 5.0, 4095.0).is_none());
-        let camera = ColorCamera::of(&made, 120.0, 5.0, 1100.0).unwrap();
+        assert!(ColorCamera::new(&Imperfections::default(), 100.0, 5.0, 4095.0).is_none());
+        let camera = ColorCamera::new(&made, 120.0, 5.0, 1100.0).unwrap();
         let frame = Frame::new(64, 48, vec![350.0; 64 * 48]).unwrap();
         let recorded = camera.record(&frame).unwrap();
         assert_eq!((recorded.width, recorded.height), (64, 48));

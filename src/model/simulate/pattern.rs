@@ -28,7 +28,7 @@ enum PatternStream {
 }
 
 impl DetectorPattern {
-    pub(super) fn of(sheet: &DataSheet) -> Self {
+    pub(super) fn generate(sheet: &DataSheet) -> Self {
         let made = &sheet.imperfections;
         let has_response = made.response_sigma > 0.0 || made.dead_pixels_per_mpx > 0.0;
         let has_dark = made.dark_current_sigma > 0.0 && sheet.dark_current_e_s > 0.0;
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_perfect_detector_has_none() {
-        let pattern = DetectorPattern::of(&data_sheet());
+        let pattern = DetectorPattern::generate(&data_sheet());
         assert!(pattern.response.is_none() && pattern.dark_current_e_s.is_none());
         assert!(pattern.offset_adu.is_none());
     }
@@ -141,7 +141,7 @@ mod tests {
         sheet.imperfections.dark_current_sigma = 0.3;
         sheet.imperfections.offset_sigma_adu = 2.0;
         sheet.imperfections.column_sigma_adu = 1.0;
-        let pattern = DetectorPattern::of(&sheet);
+        let pattern = DetectorPattern::generate(&sheet);
         let (mean, sigma) = moments(&pattern.response.unwrap());
         assert!(
             (mean - 1.0).abs() < 3e-4 && (sigma - 0.02).abs() < 2e-4,
@@ -165,7 +165,7 @@ mod tests {
         let mut sheet = data_sheet();
         sheet.imperfections.hot_pixels_per_mpx = 5000.0;
         sheet.imperfections.dead_pixels_per_mpx = 1000.0;
-        let pattern = DetectorPattern::of(&sheet);
+        let pattern = DetectorPattern::generate(&sheet);
         let dark = pattern.dark_current_e_s.unwrap();
         let hot: Vec<f32> = dark.iter().copied().filter(|e| *e > 20.001).collect();
         // 1000 and 200 in 0.2 million; five standard errors.

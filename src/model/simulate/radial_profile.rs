@@ -21,7 +21,7 @@ pub(super) struct RadialProfile {
 impl RadialProfile {
     /// The profile of the camera's spots as wide as a Gaussian of `sigma_px`; `None` for forms that
     /// need none.
-    pub fn of(made: &Imperfections, sigma_px: f64) -> Option<Self> {
+    pub fn tabulate(made: &Imperfections, sigma_px: f64) -> Option<Self> {
         /// Steps of the table in a standard deviation: linear interpolation is right to 10⁻⁴.
         const STEPS: f64 = 64.0;
         let step_px = sigma_px / STEPS;
@@ -52,7 +52,7 @@ impl RadialProfile {
     }
 
     /// Fraction of the light in a pixel at (x, y) from the star, by Gauss-Legendre quadrature.
-    pub fn share(&self, x_px: f64, y_px: f64) -> f64 {
+    pub fn fraction(&self, x_px: f64, y_px: f64) -> f64 {
         /// Places on half of a pixel's side, and weights, of six points.
         const FINE: [(f64, f64); 3] = [
             (0.119_309_593_041_598_46, 0.233_956_967_286_345_52),
@@ -115,7 +115,7 @@ mod tests {
             obstruction,
             ..Imperfections::default()
         };
-        RadialProfile::of(&made, 1.1).unwrap()
+        RadialProfile::tabulate(&made, 1.1).unwrap()
     }
 
     #[test]
@@ -127,7 +127,7 @@ mod tests {
             (SpotForm::Airy, 0.4, 0.05),
         ] {
             let profile = profile(form, obstruction);
-            let pixel = |x: i32, y: i32| profile.share(f64::from(x) - 0.3, f64::from(y) + 0.1);
+            let pixel = |x: i32, y: i32| profile.fraction(f64::from(x) - 0.3, f64::from(y) + 0.1);
             let row = |y: i32| (-reach..=reach).map(|x| pixel(x, y)).sum::<f64>();
             let sum: f64 = (-reach..=reach).map(row).sum();
             assert!(sum < 1.0 + 1e-6 && sum > 1.0 - beyond, "{form:?} {sum}");

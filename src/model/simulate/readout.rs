@@ -34,7 +34,7 @@ pub(super) struct Readout {
 }
 
 impl Readout {
-    pub(super) fn of(sheet: &DataSheet) -> Self {
+    pub(super) fn from_sheet(sheet: &DataSheet) -> Self {
         Self {
             width: sheet.width_px,
             full_well_e: sheet.full_well_e,
@@ -113,7 +113,7 @@ mod tests {
     use rand::SeedableRng;
 
     fn levels(sheet: &DataSheet, electrons: &[f64]) -> (f32, Vec<f32>) {
-        let readout = Readout::of(sheet);
+        let readout = Readout::from_sheet(sheet);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let mut collected = electrons.to_vec();
         let levels = readout.grey_levels(&mut collected, &DetectorPattern::default(), &mut random);
@@ -142,7 +142,7 @@ mod tests {
         electrons[4 * 5 + 2] = 400.0;
         electrons[5 * 5 + 2] = 130.0;
         let before: f64 = electrons.iter().sum();
-        Readout::of(&sheet).bloom(&mut electrons);
+        Readout::from_sheet(&sheet).bloom(&mut electrons);
         assert!((electrons.iter().sum::<f64>() - before).abs() < 1e-9);
         let column: Vec<f64> = (0..9).map(|y| electrons[y * 5 + 2]).collect();
         assert_eq!(column[4], 100.0);
@@ -154,7 +154,7 @@ mod tests {
         // With an anti-blooming drain the excess does not flow.
         sheet.imperfections.blooming = 0.0;
         let mut drained = vec![400.0; 45];
-        Readout::of(&sheet).bloom(&mut drained);
+        Readout::from_sheet(&sheet).bloom(&mut drained);
         assert!(drained.iter().all(|e| *e == 400.0));
     }
 }

@@ -95,7 +95,7 @@ impl<'a> Simulator<'a> {
             scene: *scene,
             stars,
             camera: camera_of(sheet),
-            pattern: DetectorPattern::of(sheet),
+            pattern: DetectorPattern::generate(sheet),
             uniform: PoissonTable::new(budget.background_e + budget.dark_e),
             light,
         })
@@ -346,7 +346,7 @@ impl<'a> Simulator<'a> {
                 }
             });
         }
-        let readout = Readout::of(sheet);
+        let readout = Readout::from_sheet(sheet);
         let pixels = readout.grey_levels(image.pixels_mut(), &self.pattern, &mut random);
         let frame = Frame::new(sheet.width_px, sheet.height_px, pixels)?;
         let white_adu = sheet.saturation_adu();
@@ -355,7 +355,7 @@ impl<'a> Simulator<'a> {
         let level_adu =
             sheet.bias_adu + (budget.background_e + budget.dark_e) / sheet.gain_e_per_adu;
         let noise_adu = budget.background_noise_e / sheet.gain_e_per_adu;
-        match ColorCamera::of(&sheet.imperfections, level_adu, noise_adu, white_adu) {
+        match ColorCamera::new(&sheet.imperfections, level_adu, noise_adu, white_adu) {
             Some(camera) => camera.record(&frame),
             None => Ok(frame),
         }

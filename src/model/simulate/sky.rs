@@ -125,19 +125,19 @@ impl<'a> SimulatedSky<'a> {
         let moon = self
             .moonlight
             .as_ref()
-            .map(|moon| CoarseGrid::of(image, GRID_PX, |place| moon.at(self.camera, place)));
+            .map(|moon| CoarseGrid::sample(image, GRID_PX, |place| moon.at(self.camera, place)));
         let clouds = self.clouds.as_ref().filter(|clouds| clouds.light > 0.0);
         let clouds = clouds.map(|clouds| {
-            let grid = CoarseGrid::of(image, clouds.grid_px(), |place| clouds.height(place));
+            let grid = CoarseGrid::sample(image, clouds.grid_px(), |place| clouds.height(place));
             (clouds.light, grid)
         });
         let altitudes = self.altitudes.as_ref();
         let glow = altitudes.map(|altitudes| {
-            CoarseGrid::of(image, GRID_PX, |place| altitudes.glow(place, self.camera))
+            CoarseGrid::sample(image, GRID_PX, |place| altitudes.glow(place, self.camera))
         });
         let milky_way = self.milky_way.as_ref();
         let milky_way = milky_way.map(|milky_way| {
-            CoarseGrid::of(image, GRID_PX, |place| self.starlight(milky_way, place))
+            CoarseGrid::sample(image, GRID_PX, |place| self.starlight(milky_way, place))
         });
         let centre = self.camera.centre();
         for (y, row) in image.rows_mut() {
@@ -235,7 +235,7 @@ struct CoarseGrid {
 }
 
 impl CoarseGrid {
-    fn of(image: &ElectronImage, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
+    fn sample(image: &ElectronImage, step_px: usize, value: impl Fn(&PixelPoint) -> f64) -> Self {
         let [columns, rows] = [image.width(), image.height()].map(|side| side / step_px + 2);
         let places = (0..columns * rows).map(|i| {
             let at = |step: usize| (step * step_px) as f64;

@@ -33,10 +33,10 @@ pub(super) struct SpotRenderer {
 impl SpotRenderer {
     pub(super) fn new(sheet: &DataSheet) -> Self {
         let form = sheet.imperfections.spot_form;
-        let aberrations = Aberrations::of(sheet);
+        let aberrations = Aberrations::from_sheet(sheet);
         Self {
             form,
-            profile: RadialProfile::of(&sheet.imperfections, aberrations.ray_sigma_px()),
+            profile: RadialProfile::tabulate(&sheet.imperfections, aberrations.ray_sigma_px()),
             picture: picture(sheet),
             aberrations,
             rays: Vec::new(),
@@ -72,7 +72,11 @@ impl SpotRenderer {
     pub(super) fn add(&mut self, image: &mut ElectronImage, position: &PixelPoint, electrons: f64) {
         let mut rays = std::mem::take(&mut self.rays);
         self.aberrations.trace(position, &mut rays);
-        for Ray { offset_px, share } in &rays {
+        for Ray {
+            offset_px,
+            fraction: share,
+        } in &rays
+        {
             let place = PixelPoint::new(position.x + offset_px[0], position.y + offset_px[1]);
             self.add_ray(image, &place, share * electrons);
         }
@@ -87,7 +91,7 @@ impl SpotRenderer {
             return;
         }
         if let Some(profile) = &self.profile {
-            let share = |x, y| profile.share(x, y);
+            let share = |x, y| profile.fraction(x, y);
             return add_pixels(image, position, electrons, columns, rows, share);
         }
         if let Some((picture, step_px)) = &self.picture {
@@ -95,7 +99,7 @@ impl SpotRenderer {
             return add_pixels(image, position, electrons, columns, rows, share);
         }
         if self.form == SpotForm::Disc {
-            let share = |x, y| disc_share(x, y, reach_px);
+            let share = |x, y| disc_fraction(x, y, reach_px);
             return add_pixels(image, position, electrons, columns, rows, share);
         }
         let sigma_px = self.sigma_px();
@@ -177,7 +181,7 @@ fn gaussian_profile(
 }
 
 /// Fraction of a uniform disc in a pixel whose centre is at (x, y) from the disc's.
-fn disc_share(x_px: f64, y_px: f64, radius_px: f64) -> f64 {
+fn disc_fraction(x_px: f64, y_px: f64, radius_px: f64) -> f64 {
     let [left, right] = [-0.5, 0.5].map(|half| (x_px + half) / radius_px);
     let [top, bottom] = [-0.5, 0.5].map(|half| (y_px + half) / radius_px);
     let area = disc_before(right, bottom) - disc_before(left, bottom) - disc_before(right, top)

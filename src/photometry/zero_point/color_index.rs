@@ -15,12 +15,12 @@ pub(crate) struct ColorIndex {
 impl ColorIndex {
     /// That of stars whose instrumental magnitude is V less the ratio in magnitudes. `None` where they tell no
     /// color.
-    pub fn of(stars: &[StandardStar]) -> Option<Self> {
+    pub fn fit(stars: &[StandardStar]) -> Option<Self> {
         /// A color is told if k is so many of its standard errors.
-        const LEAST_SIGMAS: f64 = 10.0;
+        const MIN_SIGMAS: f64 = 10.0;
         let fit = Relation::fit(stars, &[Term::Color, Term::ColorOfSecondOrder])?;
         let per_mag = fit.estimate(1);
-        (per_mag.value.abs() > LEAST_SIGMAS * per_mag.sigma).then(|| Self {
+        (per_mag.value.abs() > MIN_SIGMAS * per_mag.sigma).then(|| Self {
             coefficients: [0, 1, 2].map(|term| fit.estimate(term).value),
             covariance: Matrix3::from_fn(|row, column| fit.covariance(row, column)),
         })
@@ -30,15 +30,15 @@ impl ColorIndex {
     pub fn bv_mag(&self, ratio_mag: f64) -> Option<Estimate> {
         const ROUNDS: usize = 20;
         /// Colors of stars, from the reference on.
-        const LEAST_MAG: f64 = -1.0;
-        const MOST_MAG: f64 = 1.4;
+        const MIN_MAG: f64 = -1.0;
+        const MAX_MAG: f64 = 1.4;
         let [zero, per_mag, curve] = self.coefficients;
         let mut off_mag = 0.0;
         for _ in 0..ROUNDS {
             let rest = ratio_mag - zero - off_mag * (per_mag + off_mag * curve);
             off_mag += rest / (per_mag + 2.0 * off_mag * curve);
         }
-        if !(LEAST_MAG..MOST_MAG).contains(&off_mag) {
+        if !(MIN_MAG..MAX_MAG).contains(&off_mag) {
             return None;
         }
         let row = Vector3::new(1.0, off_mag, off_mag * off_mag);
@@ -70,7 +70,7 @@ mod tests {
             }
         };
         let stars: Vec<StandardStar> = (0..90).map(star).collect();
-        let index = ColorIndex::of(&stars).unwrap();
+        let index = ColorIndex::fit(&stars).unwrap();
         for bv_mag in [0.3, 0.64, 1.1] {
             let found = index.bv_mag(ratio_mag(bv_mag)).unwrap();
             let off_mag = found.value - bv_mag;
@@ -80,6 +80,6 @@ mod tests {
             );
         }
         assert_eq!(index.bv_mag(9.0), None);
-        assert_eq!(ColorIndex::of(&stars[..12]), None);
+        assert_eq!(ColorIndex::fit(&stars[..12]), None);
     }
 }

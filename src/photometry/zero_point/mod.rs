@@ -33,7 +33,7 @@ pub use standard::{NoZeroPoint, ZeroPoint};
 use relation::{Relation, Term};
 
 /// A color term is tried where at least this share of the stars has a color.
-const MIN_COLORED_SHARE: f64 = 0.5;
+const MIN_COLORED_FRACTION: f64 = 0.5;
 
 /// Measures the zero point of `stars`; `None` if they are too few.
 pub(crate) fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
@@ -42,7 +42,7 @@ pub(crate) fn measure(stars: &[StandardStar]) -> Option<ZeroPoint> {
     }
     let with_color = |star: &&StandardStar| star.bv_mag.is_some();
     let colored: Vec<StandardStar> = stars.iter().filter(with_color).copied().collect();
-    let has_colors = colored.len() as f64 >= MIN_COLORED_SHARE * stars.len() as f64;
+    let has_colors = colored.len() as f64 >= MIN_COLORED_FRACTION * stars.len() as f64;
     let with_term = has_colors
         .then(|| Relation::fit_significant(&colored, &[Term::Color]))
         .flatten();

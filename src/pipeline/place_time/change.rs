@@ -32,7 +32,7 @@ pub enum Change {
 }
 
 /// A sign of a smaller latitude or longitude changes nothing, in degrees.
-const LEAST_DEG: f64 = 2.0;
+const MIN_DEG: f64 = 2.0;
 /// A sidereal day is shorter than a day by this angle, in degrees.
 const DEG_PER_DAY: f64 = 0.985_647;
 const DEG_PER_HOUR: f64 = 15.041;
@@ -75,14 +75,14 @@ impl Change {
     }
 
     /// The stated place and time with this change.
-    fn of(self, (site, date): (Site, ObservationDate)) -> Option<(Site, ObservationDate)> {
+    fn apply(self, (site, date): (Site, ObservationDate)) -> Option<(Site, ObservationDate)> {
         let (lat, lon) = (site.lat_deg(), site.lon_deg());
         let at = |lat, lon| Some((site.moved_to(lat, lon)?, date));
         match self {
-            Self::LatitudeSign => (lat.abs() >= LEAST_DEG).then(|| at(-lat, lon))?,
-            Self::LongitudeSign => (lon.abs() >= LEAST_DEG).then(|| at(lat, -lon))?,
+            Self::LatitudeSign => (lat.abs() >= MIN_DEG).then(|| at(-lat, lon))?,
+            Self::LongitudeSign => (lon.abs() >= MIN_DEG).then(|| at(lat, -lon))?,
             Self::BothSigns => {
-                let differ = lat.abs() >= LEAST_DEG && lon.abs() >= LEAST_DEG;
+                let differ = lat.abs() >= MIN_DEG && lon.abs() >= MIN_DEG;
                 differ.then(|| at(-lat, -lon))?
             }
             Self::Exchanged => at(lon, lat),
@@ -123,7 +123,7 @@ pub(super) fn candidates(
     let days = days.chain(best_days.filter(|days| *days != 0));
     let changes = signs.into_iter().chain(hours).chain(days.map(Change::Days));
     let changed = |change: Change| {
-        let (site, date) = change.of(stated)?;
+        let (site, date) = change.apply(stated)?;
         Some(PlaceTimeCandidate { change, site, date })
     };
     let place = level.and_then(|level| {
@@ -161,7 +161,7 @@ pub(super) fn other_dates(
         });
     let years = (-2..=2).filter(|years| *years != 0).map(Change::Years);
     let years = years.filter_map(move |change| {
-        let (site, date) = change.of(stated)?;
+        let (site, date) = change.apply(stated)?;
         Some(PlaceTimeCandidate { change, site, date })
     });
     orders.chain(years)

@@ -40,7 +40,7 @@ impl<'a> Examination<'a> {
         }
     }
 
-    pub fn of(&self, site: Site, date: ObservationDate) -> Assessed<'_, 'a> {
+    pub fn assess(&self, site: Site, date: ObservationDate) -> Assessed<'_, 'a> {
         let places = StarPlaces::at(&date, Some(site), None);
         let mut assessed = Assessed {
             examination: self,
@@ -89,14 +89,11 @@ impl Assessed<'_, '_> {
     /// refraction is.
     const REFRACTION_LIMIT: f64 = 60.0;
     /// A named star may be no star at all with at least this probability.
-    const LEAST_CHANCE: f64 = 0.01;
+    const MIN_CHANCE: f64 = 0.01;
 
     /// log10 of the probability that all names below the horizon are chance.
     pub fn log10_chance_below(&self) -> f64 {
-        let chances = self
-            .below
-            .iter()
-            .map(|chance| chance.max(Self::LEAST_CHANCE));
+        let chances = self.below.iter().map(|chance| chance.max(Self::MIN_CHANCE));
         chances.map(libm::log10).sum()
     }
 

@@ -77,7 +77,7 @@ pub(super) fn settle(
         let found = outcome.identification()?;
         let sky = ObservedSky::new(found, sources, catalog);
         let examination = Examination::new(&sky, sources);
-        let assessed = examination.of(site, date);
+        let assessed = examination.assess(site, date);
         let verdict = verdict(&assessed);
         Some((assessed.is_odd() || verdict.is_some(), verdict))
     };
@@ -170,13 +170,13 @@ fn verdict(assessed: &Assessed) -> Option<PlaceTime> {
     let held = others
         .into_iter()
         .filter_map(|candidate: PlaceTimeCandidate| {
-            let other = assessed.examination.of(candidate.site, candidate.date);
+            let other = assessed.examination.assess(candidate.site, candidate.date);
             let is_possible = other.contradictions().is_empty();
             is_possible.then(|| (candidate, other.cost() + candidate.change.rarity()))
         });
     Some(PlaceTime {
         stated: None,
         contradictions,
-        proposals: proposal::of(held.collect()),
+        proposals: proposal::select(held.collect()),
     })
 }

@@ -41,7 +41,7 @@ pub struct Proposal {
 const MAX_ODDS: f64 = 50.0;
 
 /// Of changes with their costs, those that are nearly as good as the best, one of each kind.
-pub(super) fn of(mut assessed: Vec<(PlaceTimeCandidate, f64)>) -> Vec<Proposal> {
+pub(super) fn select(mut assessed: Vec<(PlaceTimeCandidate, f64)>) -> Vec<Proposal> {
     assessed.sort_by(|a, b| a.1.total_cmp(&b.1));
     let Some(least) = assessed.first().map(|(_, cost)| *cost) else {
         return Vec::new();

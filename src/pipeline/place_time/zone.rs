@@ -33,7 +33,7 @@ pub(super) fn by_stars(
     let costs = zones.filter_map(|(ahead_h, rarity)| {
         let ahead = of_hours(ahead_h);
         let date = local.earlier_by(ahead)?;
-        let assessed = examination.of(site, date);
+        let assessed = examination.assess(site, date);
         let is_possible = assessed.contradictions().is_empty();
         is_possible.then(|| ((ahead, date), assessed.cost() + rarity))
     });

@@ -33,14 +33,14 @@ pub(in crate::report) fn sky_layers(size: Size, found: &Identification) -> Vec<S
     let drawn = |layer: OverlayLayer| {
         let mut canvas = Canvas::new(size, unit);
         layer.draw(&mut canvas, &picture, found, &mut Room::all(image, unit));
-        SkyLayer::of(layer, canvas)
+        SkyLayer::from_canvas(layer, canvas)
     };
     let layers = OverlayLayer::ALL.into_iter().map(drawn);
     layers.filter(|layer| !layer.is_empty()).collect()
 }
 
 impl SkyLayer {
-    fn of(layer: OverlayLayer, canvas: Canvas) -> Self {
+    fn from_canvas(layer: OverlayLayer, canvas: Canvas) -> Self {
         let (key, title) = names(layer);
         let mut this = Self {
             key,

@@ -154,8 +154,8 @@ fn draw_scale(
 ) -> f32 {
     /// Largest length in units, and as a share of the picture's width.
     const BAR: f32 = 150.0;
-    const BAR_SHARE: f32 = 0.3;
-    let most = (BAR * canvas.unit).min(BAR_SHARE * canvas.width());
+    const BAR_FRACTION: f32 = 0.3;
+    let most = (BAR * canvas.unit).min(BAR_FRACTION * canvas.width());
     let pixels = |arcsec: f64| {
         length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * picture.scale()
     };

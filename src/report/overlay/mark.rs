@@ -97,7 +97,7 @@ pub(super) fn marks(
         .filter(|(index, _)| !is_body(*index))
         .map(|(_, (source, star_match))| {
             let [x, y] = picture.position_of(&source.position);
-            let label = star_match.map(|found| StarLabel::of(catalog, found.star, label));
+            let label = star_match.map(|found| StarLabel::of_star(catalog, found.star, label));
             Mark {
                 x,
                 y,
@@ -153,9 +153,9 @@ impl RingRadii {
         /// Smallest radius in pixels of the frame: enlarged stars need larger rings.
         const MIN_RADIUS_PX: f32 = 3.0;
         /// In a crowd, the smallest ring is this share of the mean distance between stars, ...
-        const SHARE_OF_SPACING: f32 = 0.2;
+        const FRACTION_OF_SPACING: f32 = 0.2;
         /// ... but at least this share of its usual size.
-        const MIN_SHARE: f32 = 0.6;
+        const MIN_FRACTION: f32 = 0.6;
         /// Share of the detections that get larger rings than the smallest.
         const LARGER_RINGS: f64 = 0.8;
         let faintest_larger = (sources.len() as f64 * LARGER_RINGS) as usize;
@@ -167,7 +167,7 @@ impl RingRadii {
                 .get(faintest_larger)
                 .and_then(|s| s.flux)
                 .unwrap_or(f64::NAN),
-            smallest: usual * (SHARE_OF_SPACING * spacing / usual).clamp(MIN_SHARE, 1.0),
+            smallest: usual * (FRACTION_OF_SPACING * spacing / usual).clamp(MIN_FRACTION, 1.0),
             unit: picture.stroke_unit(),
         }
     }

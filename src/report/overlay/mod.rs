@@ -91,7 +91,7 @@ fn drawing(
     catalog: &Catalog,
     options: &OverlayOptions,
 ) -> (Canvas, Picture) {
-    let picture = Picture::of(shown, solution.background.as_ref(), options);
+    let picture = Picture::draw(shown, solution.background.as_ref(), options);
     let marks = mark::marks(solution, catalog, &picture, options.label);
     let unit = picture.stroke_unit();
     let mut canvas = Canvas::new(legend::size(&picture, unit), unit);
@@ -121,7 +121,7 @@ pub fn photograph(
     background: Option<&Background>,
     options: &OverlayOptions,
 ) -> RgbImage {
-    Picture::of(shown, background, options).into_image()
+    Picture::draw(shown, background, options).into_image()
 }
 
 /// A frame without marks, reduced to at most `most_px` columns.

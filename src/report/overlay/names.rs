@@ -47,7 +47,7 @@ pub(super) struct StarLabel {
 
 impl StarLabel {
     /// The label of a star.
-    pub(super) fn of(catalog: &Catalog, star: StarIndex, kind: LabelKind) -> Self {
+    pub(super) fn of_star(catalog: &Catalog, star: StarIndex, kind: LabelKind) -> Self {
         let name = || {
             let proper = catalog.proper_name(star).map(str::to_owned);
             proper.or_else(|| catalog.name_of(star).map(short))
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn a_star_is_called_by_what_is_wanted_and_else_by_the_next() {
         let catalog = Catalog::built_in();
-        let called = |star, kind| StarLabel::of(catalog, star, kind);
+        let called = |star, kind| StarLabel::of_star(catalog, star, kind);
         let sirius = StarIndex::new(0);
         assert_eq!(called(sirius, LabelKind::Name).text, "Sirius −1.4");
         assert_eq!(called(sirius, LabelKind::Hd).text, "HD 48915 −1.4");

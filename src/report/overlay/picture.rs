@@ -50,14 +50,14 @@ fn factors(frame: &Frame<'_>, width_px: Option<u32>) -> (usize, usize) {
 
 impl Picture {
     /// `frame`, stretched, and enlarged or reduced to a suitable size or to that which is wanted.
-    pub(super) fn of(
+    pub(super) fn draw(
         shown: &Shown<'_>,
         background: Option<&Background>,
         options: &OverlayOptions,
     ) -> Self {
         let frame = shown.frame;
         let (enlarged, reduced) = factors(frame, options.width_px);
-        let squares = Squares::of(frame, reduced);
+        let squares = Squares::new(frame, reduced);
         let Size { width, height } = squares.size;
         let small = match options.stretch {
             Stretch::None => photograph(&squares, shown.colors, None),
@@ -117,7 +117,7 @@ impl Picture {
     /// `frame` in grey, with a dark sky brightened, each `side` × `side` pixels as one.
     #[cfg(feature = "page")]
     pub(super) fn reduced(frame: &Frame<'_>, side: usize) -> Self {
-        let squares = Squares::of(frame, side);
+        let squares = Squares::new(frame, side);
         Self {
             width: squares.size.width,
             height: squares.size.height,
@@ -162,7 +162,7 @@ struct Squares<'a> {
 
 impl<'a> Squares<'a> {
     /// Those of a frame.
-    fn of(frame: &'a Frame<'a>, side: usize) -> Self {
+    fn new(frame: &'a Frame<'a>, side: usize) -> Self {
         let size = Size::new(frame.width.div_ceil(side), frame.height.div_ceil(side));
         Self { frame, side, size }
     }
@@ -262,14 +262,14 @@ impl StretchCurve {
     /// The curve for a picture with this light.
     fn of(light: &[f32], step: f32, sky_levels: Option<[f32; 2]>) -> Self {
         /// Most levels of the picture between two of the frame: more are seen as edges.
-        const MOST_LEVELS: f32 = 10.0;
+        const MAX_LEVELS: f32 = 10.0;
         /// Share of the pixels that are black, and that are white.
-        const BLACK_SHARE: f32 = 2e-3;
-        const WHITE_SHARE: f32 = 5e-4;
+        const BLACK_FRACTION: f32 = 2e-3;
+        const WHITE_FRACTION: f32 = 5e-4;
         /// Share of the pixels above the level of the sky: the rest may be trees or the ground.
-        const SKY_SHARE: f32 = 0.25;
+        const SKY_FRACTION: f32 = 0.25;
         let shares = match sky_levels {
-            Some(_) => [1.0 - BLACK_SHARE, WHITE_SHARE],
+            Some(_) => [1.0 - BLACK_FRACTION, WHITE_FRACTION],
             None => [1.0, 0.0],
         };
         let [black, white] = shares.map(|share| level_exceeded_by(light, share));
@@ -278,23 +278,23 @@ impl StretchCurve {
             range: (white - black).max(f32::MIN_POSITIVE),
             middle: 0.5,
         };
-        let sky = curve.share(level_exceeded_by(light, SKY_SHARE));
+        let sky = curve.fraction(level_exceeded_by(light, SKY_FRACTION));
         if let Some([dark, bright]) = sky_levels.filter(|_| sky > 0.0 && sky < 1.0) {
             // The curve is steepest at black.
             let steepest =
-                (MOST_LEVELS / 255.0 * curve.range / step.max(f32::MIN_POSITIVE)).max(1.0);
+                (MAX_LEVELS / 255.0 * curve.range / step.max(f32::MIN_POSITIVE)).max(1.0);
             curve.middle = midtones(sky.clamp(dark, bright), sky).max(1.0 / (1.0 + steepest));
         }
         curve
     }
 
-    fn share(&self, level: f32) -> f32 {
+    fn fraction(&self, level: f32) -> f32 {
         ((level - self.black) / self.range).clamp(0.0, 1.0)
     }
 
     /// The level of the picture; black for NaN.
     fn apply(&self, level: f32) -> u8 {
-        (255.0 * midtones(self.middle, self.share(level))).round() as u8
+        (255.0 * midtones(self.middle, self.fraction(level))).round() as u8
     }
 }
 
@@ -317,13 +317,13 @@ fn above_sky(squares: &Squares<'_>, noise: f32) -> Vec<u8> {
     /// The stretch is linear up to this many standard deviations above black, then logarithmic.
     const LINEAR_SIGMA: f32 = 4.0;
     /// White is the level that this share of the pixels exceeds, ...
-    const WHITE_SHARE: f32 = 5e-4;
+    const WHITE_FRACTION: f32 = 5e-4;
     /// ... but at least this many standard deviations.
     const MIN_WHITE_SIGMA: f32 = 40.0;
     /// Entries of the table from level to grey.
     const STEPS: usize = 4096;
     let light = squares.light_above_sky();
-    let bright = level_exceeded_by(&light, WHITE_SHARE);
+    let bright = level_exceeded_by(&light, WHITE_FRACTION);
     let brightest = light.iter().copied().fold(0.0, f32::max);
     // Without noise, as in a drawing, the range of the frame sets the scale.
     let noise = noise.max(brightest * 1e-3).max(f32::MIN_POSITIVE * 1e6);
@@ -408,7 +408,7 @@ mod tests {
                 ..OverlayOptions::default()
             };
             let frame = frame(width, height);
-            let picture = Picture::of(&Shown::new("", &frame), None, &options);
+            let picture = Picture::draw(&Shown::new("", &frame), None, &options);
             assert_eq!(picture.width, wanted as usize);
             assert_eq!(picture.pixels.len(), picture.width * picture.height);
             let far = PixelPoint::new(width as f64 - 0.5, height as f64 - 0.5);
@@ -431,7 +431,7 @@ mod tests {
             ((2600, 100), (1300, 50), 0.5),
             ((5001, 3), (1667, 1), 1.0 / 3.0),
         ] {
-            let picture = Picture::of(
+            let picture = Picture::draw(
                 &Shown::new("", &frame(size.0, size.1)),
                 None,
                 &with(Stretch::Soft),
@@ -444,7 +444,7 @@ mod tests {
 
     #[test]
     fn the_centre_of_the_first_pixel_is_the_middle_of_its_square() {
-        let picture = Picture::of(
+        let picture = Picture::draw(
             &Shown::new("", &frame(400, 400)),
             None,
             &with(Stretch::None),
@@ -475,7 +475,7 @@ mod tests {
             noise_adu: 2.9,
             sky_share: 1.0,
         };
-        let picture = Picture::of(&Shown::new("", &frame), Some(&sky), &with(Stretch::Hard));
+        let picture = Picture::draw(&Shown::new("", &frame), Some(&sky), &with(Stretch::Hard));
         assert_eq!(picture.pixels[315 * width + 415], [255; 3]);
         assert_eq!(picture.pixels[5], [0; 3]);
         let mean = |from: usize| {
@@ -536,10 +536,10 @@ mod tests {
             colors: Some(&colors),
             ..Shown::new("", &frame)
         };
-        let picture = Picture::of(&shown, None, &with(Stretch::Soft));
+        let picture = Picture::draw(&shown, None, &with(Stretch::Soft));
         let ordered = |[r, g, b]: &&[u8; 3]| r >= g && g >= b && r > b;
         assert!(picture.pixels.iter().filter(ordered).count() > width * height * 9 / 10);
-        let grey = Picture::of(&shown, None, &with(Stretch::Hard));
+        let grey = Picture::draw(&shown, None, &with(Stretch::Hard));
         assert!(grey.pixels.iter().all(|[r, g, b]| r == g && g == b));
     }
 }

@@ -70,7 +70,7 @@ impl<'a> StarColumns<'a> {
 
 impl<'a> PageData<'a> {
     /// The numbers of a frame.
-    pub(super) fn of(report: &'a FrameReport, solution: &Solution) -> Self {
+    pub(super) fn new(report: &'a FrameReport, solution: &Solution) -> Self {
         let offsets = offsets(solution);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));

@@ -88,15 +88,15 @@ pub struct Thumbnail {
 
 impl Thumbnail {
     /// Pictures on a page; the rest of the frames is in its tables.
-    pub const MOST: usize = 40;
+    pub const MAX: usize = 40;
 
     /// A picture of `frame`, at most 240 pixels wide.
     ///
     /// # Errors
     /// If it cannot be encoded, which does not occur for pictures of this size.
     pub fn new(name: String, text: String, frame: &Frame<'_>) -> io::Result<Self> {
-        const MOST_PX: usize = 240;
-        let picture = thumbnail(frame, MOST_PX);
+        const MAX_PX: usize = 240;
+        let picture = thumbnail(frame, MAX_PX);
         Ok(Self {
             name,
             text,

@@ -31,7 +31,7 @@ pub fn html(
     shown: Option<&Shown<'_>>,
     options: &OverlayOptions,
 ) -> io::Result<String> {
-    let data = PageData::of(report, solution);
+    let data = PageData::new(report, solution);
     let picture = shown.map(|shown| picture(shown, solution, options));
     let title = shown.map_or(report.frame.as_str(), |shown| shown.title);
     let values = values(report, title, picture.transpose()?, &data);
@@ -58,7 +58,7 @@ pub fn view(
     shown: &Shown<'_>,
     options: &OverlayOptions,
 ) -> io::Result<FrameView> {
-    let data = PageData::of(report, solution);
+    let data = PageData::new(report, solution);
     let picture = picture(shown, solution, options)?;
     let values = values(report, shown.title, Some(picture), &data);
     Ok(FrameView {

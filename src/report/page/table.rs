@@ -87,7 +87,7 @@ impl ColumnCells {
             text => number_of(text).map(|number| Some(Number(number))),
         };
         let numbers: Option<Vec<_>> = cells.iter().map(number).collect();
-        numbers.map_or_else(|| Self::Texts(Texts::of(cells)), Self::Numbers)
+        numbers.map_or_else(|| Self::Texts(Texts::from_cells(cells)), Self::Numbers)
     }
 }
 
@@ -97,7 +97,7 @@ fn number_of(text: &str) -> Option<f64> {
 }
 
 impl Texts {
-    fn of(cells: &[&str]) -> Self {
+    fn from_cells(cells: &[&str]) -> Self {
         let mut all = Vec::new();
         let mut places = HashMap::new();
         let which = cells.iter().map(|cell| {

@@ -132,7 +132,7 @@ pub fn is_header(file: &[u8]) -> bool {
 pub fn add_projection(header: &mut FitsHeader, view: &SkyView, row_order: RowOrder) {
     let SkyView { camera, places, .. } = view;
     let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
-    let plane = Plane::of(camera);
+    let plane = Plane::from_camera(camera);
     let reference = if camera.is_pinhole() {
         camera.centre()
     } else {

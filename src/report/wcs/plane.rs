@@ -21,7 +21,7 @@ pub(super) enum Plane {
 
 impl Plane {
     /// The plane of a camera. Its radial distortion is part of it, as far as a projection can have it.
-    pub(super) fn of(camera: &CameraModel) -> Self {
+    pub(super) fn from_camera(camera: &CameraModel) -> Self {
         if camera.is_pinhole() {
             Self::Gnomonic
         } else {

@@ -35,7 +35,7 @@ pub(super) struct ClearFit {
 
 impl ClearFit {
     /// The fit to the stars that are not dimmed. `None` if they are too few.
-    pub fn of(candidates: &[ClearSkyStar], is_flat: bool) -> Option<Self> {
+    pub fn fit(candidates: &[ClearSkyStar], is_flat: bool) -> Option<Self> {
         let fitted = |largest_mag| Self::to_brighter(candidates, largest_mag, is_flat, &ABOVE);
         LARGEST_SIGMAS_MAG.into_iter().find_map(fitted)
     }
@@ -105,7 +105,7 @@ impl ClearFit {
                 fit: next,
                 errors: next_errors,
                 stars: clear.round() as usize,
-                clouds: CloudMix::of(&stars),
+                clouds: CloudMix::estimate(&stars),
             };
             if changed_mag.max(moved_mag) < SETTLED_MAG {
                 break;
@@ -152,7 +152,7 @@ impl RelationFit {
         is_flat: bool,
     ) -> Option<Self> {
         /// Least information of a star, over what it has if it is known to be clear.
-        const LEAST: f64 = 0.1;
+        const MIN: f64 = 0.1;
         let known = experience(is_flat);
         let mut fit = LinearFit::new();
         for (unknown, Estimate { value, sigma }) in known.into_iter().enumerate() {
@@ -161,7 +161,9 @@ impl RelationFit {
         }
         let mut information = fit.matrix;
         for (star, kind) in stars {
-            let variance = errors.of(star.expected_sigma_mag(&before.unknowns)).powi(2);
+            let variance = errors
+                .actual_sigma_mag(star.expected_sigma_mag(&before.unknowns))
+                .powi(2);
             let square = star.row * star.row.transpose() * (kind.clear / variance);
             fit.add(
                 &star.row,
@@ -170,7 +172,7 @@ impl RelationFit {
             );
             // What is lost as it may be behind clouds (Louis 1982, J. R. Stat. Soc. B 44, 226).
             let lost = (1.0 - kind.clear) * star.residual_mag(&before.unknowns).powi(2) / variance;
-            information += square * (1.0 - lost).max(LEAST);
+            information += square * (1.0 - lost).max(MIN);
         }
         Some(Self {
             unknowns: fit.solve()?,
@@ -185,7 +187,7 @@ impl RelationFit {
         errors: &StarErrors,
     ) -> f64 {
         let square = |(star, kind): &(&ClearSkyStar, StarMembership)| {
-            let sigma_mag = errors.of(star.expected_sigma_mag(&self.unknowns));
+            let sigma_mag = errors.actual_sigma_mag(star.expected_sigma_mag(&self.unknowns));
             kind.clear * (star.residual_mag(&self.unknowns) / sigma_mag).powi(2)
         };
         let sum: f64 = stars.iter().map(square).sum();
@@ -226,7 +228,7 @@ mod tests {
             }
         };
         let candidates: Vec<ClearSkyStar> = (0..200).map(candidate).collect();
-        ClearFit::of(&candidates, true).expect("there are enough stars")
+        ClearFit::fit(&candidates, true).expect("there are enough stars")
     }
 
     fn assert_right(fitted: &ClearFit, clear: usize) {

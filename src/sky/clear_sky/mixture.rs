@@ -10,7 +10,7 @@ const MEAN_CLOUD_MAG: f64 = 1.0;
 /// Least number of stars in clear air, and their least share of all: fewer may be brighter by a neighbor, in a
 /// sky that is clear.
 const MIN_STARS: f64 = 12.0;
-const MIN_SHARE: f64 = 0.1;
+const MIN_FRACTION: f64 = 0.1;
 
 /// What the magnitudes of stars in clear air scatter, beside what is stated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +24,7 @@ pub(super) struct StarErrors {
 
 impl StarErrors {
     /// The error of a magnitude with this stated one.
-    pub fn of(&self, sigma_mag: f64) -> f64 {
+    pub fn actual_sigma_mag(&self, sigma_mag: f64) -> f64 {
         libm::hypot(self.scale * sigma_mag, self.scatter_mag)
     }
 }
@@ -35,7 +35,7 @@ pub(super) struct CloudMix {
     /// Part of the stars that is behind clouds.
     clouded: f64,
     /// Shares of these stars.
-    shares: [f64; PARTS],
+    fractions: [f64; PARTS],
 }
 
 /// Extinctions of the parts, and their standard deviations, in magnitudes. Air with less counts as clear.
@@ -52,11 +52,11 @@ impl CloudMix {
     pub fn usual() -> Self {
         Self {
             clouded: 0.5,
-            shares: Self::usual_shares(),
+            fractions: Self::usual_fractions(),
         }
     }
 
-    fn usual_shares() -> [f64; PARTS] {
+    fn usual_fractions() -> [f64; PARTS] {
         let weight =
             |part: usize| PART_SIGMA_MAG[part] * libm::exp(-PART_MAG[part] / MEAN_CLOUD_MAG);
         let total: f64 = (0..PARTS).map(weight).sum();
@@ -64,17 +64,17 @@ impl CloudMix {
     }
 
     /// By what `stars` are, and what is usual.
-    pub fn of(stars: &[(&ClearSkyStar, StarMembership)]) -> Self {
+    pub fn estimate(stars: &[(&ClearSkyStar, StarMembership)]) -> Self {
         /// Stars in clear air, and behind clouds, which a frame has beforehand.
         const BEFOREHAND: f64 = 0.5;
         let cloudy = |part: usize| stars.iter().map(|(_, kind)| kind.clouds[part]).sum::<f64>();
-        let usual = Self::usual_shares();
+        let usual = Self::usual_fractions();
         let counts: [f64; PARTS] =
             std::array::from_fn(|part| BEFOREHAND * usual[part] + cloudy(part));
         let cloudy: f64 = counts.iter().sum();
         Self {
             clouded: cloudy / (cloudy + BEFOREHAND + clear_stars(stars)),
-            shares: counts.map(|count| count / cloudy),
+            fractions: counts.map(|count| count / cloudy),
         }
     }
 }
@@ -102,11 +102,11 @@ impl ClearSkyStar {
         /// Their magnitudes are anything within this range.
         const UNTRUE_RANGE_MAG: f64 = 6.0;
         let dimmer_mag = -self.residual_mag(unknowns);
-        let sigma_mag = errors.of(self.expected_sigma_mag(unknowns));
+        let sigma_mag = errors.actual_sigma_mag(self.expected_sigma_mag(unknowns));
         let normal = |off_mag: f64, sigma_mag: f64| normal_density(off_mag / sigma_mag) / sigma_mag;
         let of_part = |part: usize| {
             let sigma_mag = libm::hypot(sigma_mag, PART_SIGMA_MAG[part]);
-            clouds.shares[part] * normal(dimmer_mag - PART_MAG[part], sigma_mag)
+            clouds.fractions[part] * normal(dimmer_mag - PART_MAG[part], sigma_mag)
         };
         let clear = (1.0 - UNTRUE) * (1.0 - clouds.clouded) * normal(dimmer_mag, sigma_mag);
         let parts: [f64; PARTS] =
@@ -122,7 +122,7 @@ impl ClearSkyStar {
 
 /// How many of so many stars are in clear air at least.
 pub(super) fn least_clear(stars: usize) -> f64 {
-    MIN_STARS.max(MIN_SHARE * stars as f64)
+    MIN_STARS.max(MIN_FRACTION * stars as f64)
 }
 
 /// Number of stars in clear air.
@@ -138,8 +138,8 @@ pub(super) fn errors_of(
     unknowns: &Unknowns,
 ) -> StarErrors {
     /// Least scatter of a star: its catalogue magnitude and its pixels.
-    const LEAST_MAG: f64 = 0.02;
-    const MOST_MAG: f64 = 0.5;
+    const MIN_MAG: f64 = 0.02;
+    const MAX_MAG: f64 = 0.5;
     const MIN_PAIRS: usize = 20;
     /// Stated errors too large by less than this are right.
     const LARGEST_SCALE: f64 = 0.8;
@@ -167,6 +167,6 @@ pub(super) fn errors_of(
     }
     StarErrors {
         scale,
-        scatter_mag: scatter_mag2.max(LEAST_MAG.powi(2)).sqrt().min(MOST_MAG),
+        scatter_mag: scatter_mag2.max(MIN_MAG.powi(2)).sqrt().min(MAX_MAG),
     }
 }

@@ -65,13 +65,13 @@ pub struct ClearSky {
 
 impl ClearSky {
     /// Measures it; `None` with too few stars.
-    pub(super) fn of(stars: &[SkyStar], is_flat: bool) -> Option<Self> {
+    pub(super) fn measure(stars: &[SkyStar], is_flat: bool) -> Option<Self> {
         let measured = || stars.iter().filter(|star| star.measured.is_some());
         let sum: f64 = measured().map(|star| star.v_mag).sum();
         let mean_vmag = sum / measured().count().max(1) as f64;
         let candidates = ClearSkyStar::all_of(stars, mean_vmag);
         let has_horizon = stars.iter().any(|star| star.airmass.is_some());
-        let fitted = ClearFit::of(&candidates, is_flat)?;
+        let fitted = ClearFit::fit(&candidates, is_flat)?;
         Some(Self::by(&fitted, has_horizon, mean_vmag))
     }
 
@@ -138,7 +138,7 @@ impl ClearSky {
         } = star.measured?;
         Some(Estimate {
             value: self.dimmer_mag(star, instrumental_mag),
-            sigma: self.errors.of(sigma_mag),
+            sigma: self.errors.actual_sigma_mag(sigma_mag),
         })
     }
 
@@ -216,7 +216,7 @@ impl ClearSky {
 
 /// Whether a slope is that of a tone curve.
 fn is_tone_curve(slope: &Estimate) -> bool {
-    const LEAST_SLOPE: f64 = 0.1;
+    const MIN_SLOPE: f64 = 0.1;
     const SIGMAS: f64 = 3.0;
-    slope.value.abs() > LEAST_SLOPE.max(SIGMAS * slope.sigma)
+    slope.value.abs() > MIN_SLOPE.max(SIGMAS * slope.sigma)
 }

@@ -1,6 +1,6 @@
 //! The light of the clear sky and of clouds, and which cells have it.
 
-use super::lit_cell::{Hidden, LitCell, STEPS, share_of};
+use super::lit_cell::{Hidden, LitCell, STEPS, fraction_of};
 use super::per_share::{CloudLightRatio, CloudyCell};
 use crate::base::statistics::median;
 use nalgebra::{DMatrix, DVector};
@@ -11,7 +11,7 @@ const UNTRUE: f64 = 0.02;
 /// Their light, over that of the clear sky, is anything in a range as broad as this.
 const UNTRUE_RANGE: f64 = 2.0;
 /// Least scatter of a cell's light about the clear sky's.
-const LEAST_SIGMA: f64 = 0.005;
+const MIN_SIGMA: f64 = 0.005;
 
 /// The light of the clear sky and of clouds.
 pub(super) struct CloudLightFit {
@@ -31,8 +31,8 @@ pub(super) struct CloudLightFit {
 #[derive(Debug, Clone, Copy, Default)]
 struct ExpectedCloud {
     /// Share of a star's light that clouds take, and its variance.
-    share: f64,
-    share_variance: f64,
+    fraction: f64,
+    fraction_variance: f64,
     /// Probability that its light tells something.
     weight: f64,
     /// Probability that it is not part of the clear sky.
@@ -109,7 +109,11 @@ impl CloudLightFit {
         let sigma = self.sigma / self.of_cloud.abs();
         let cloudy = cells.iter().filter_map(|lit| {
             let share = self.excess(lit) / self.of_cloud;
-            (share > SIGMAS * sigma).then_some(CloudyCell { share, sigma, lit })
+            (share > SIGMAS * sigma).then_some(CloudyCell {
+                fraction: share,
+                sigma,
+                lit,
+            })
         });
         let CloudLightRatio { ln_ratio, sigma } = CloudLightRatio::of(&cloudy.collect::<Vec<_>>());
         self.of_cloud *= libm::exp(ln_ratio);
@@ -128,7 +132,7 @@ impl CloudLightFit {
         for step in 0..=STEPS {
             let probability = lit.hidden.mixed(step, self.clouded);
             all += probability;
-            first += probability * share_of(step);
+            first += probability * fraction_of(step);
         }
         let share = first / all;
         let weight = if self.sigma.is_finite() {
@@ -137,7 +141,7 @@ impl CloudLightFit {
             1.0
         };
         ExpectedCloud {
-            share,
+            fraction: share,
             weight,
             ..ExpectedCloud::default()
         }
@@ -148,7 +152,7 @@ impl CloudLightFit {
         let excess = self.excess(lit);
         let [mut all, mut cloud, mut told, mut first, mut second] = [0.0; 5];
         for step in 0..=STEPS {
-            let share = share_of(step);
+            let share = fraction_of(step);
             let light = self.likelihood(excess, share);
             let both = lit.hidden.mixed(step, self.clouded) * light;
             let true_part = Self::true_part(light);
@@ -167,8 +171,8 @@ impl CloudLightFit {
         }
         let share = first / told;
         ExpectedCloud {
-            share,
-            share_variance: (second / told - share * share).max(0.0),
+            fraction: share,
+            fraction_variance: (second / told - share * share).max(0.0),
             weight: told / all,
             cloud,
         }
@@ -190,9 +194,9 @@ impl CloudLightFit {
             for (at, term) in row.iter_mut().zip(&lit.terms) {
                 *at = term / clear_light;
             }
-            row[terms] = expected.share;
+            row[terms] = expected.fraction;
             normal.ger(expected.weight, &row, &row, 1.0);
-            normal[(terms, terms)] += expected.weight * expected.share_variance;
+            normal[(terms, terms)] += expected.weight * expected.fraction_variance;
             right.axpy(expected.weight * lit.light / clear_light, &row, 1.0);
         }
         let solved = normal.cholesky()?.solve(&right);
@@ -202,17 +206,17 @@ impl CloudLightFit {
             clear: solved.rows(0, terms).into_owned(),
             of_cloud: solved[terms],
             of_cloud_sigma: 0.0,
-            sigma: LEAST_SIGMA,
+            sigma: MIN_SIGMA,
             clouded: (BEFOREHAND + cloudy) / (2.0 * BEFOREHAND + count),
         };
         let square = |(lit, expected): (&LitCell, &ExpectedCloud)| {
-            let off = next.excess(lit) - next.of_cloud * expected.share;
-            expected.weight * (off * off + next.of_cloud.powi(2) * expected.share_variance)
+            let off = next.excess(lit) - next.of_cloud * expected.fraction;
+            expected.weight * (off * off + next.of_cloud.powi(2) * expected.fraction_variance)
         };
         let squares: f64 = cells.iter().zip(expected).map(square).sum();
         let weights: f64 = expected.iter().map(|expected| expected.weight).sum();
         let freedom = (weights - terms as f64 - 1.0).max(1.0);
-        next.sigma = (squares / freedom).sqrt().max(LEAST_SIGMA);
+        next.sigma = (squares / freedom).sqrt().max(MIN_SIGMA);
         Some(next)
     }
 
@@ -224,7 +228,7 @@ impl CloudLightFit {
         let [mut foretold, mut light_all, mut cloudy] = [0.0; 3];
         let [mut by_part, mut by_part_here, mut if_clear] = [0.0; 3];
         for step in 0..=STEPS {
-            let light = self.likelihood(excess, share_of(step));
+            let light = self.likelihood(excess, fraction_of(step));
             foretold += light * lit.hidden.mixed(step, self.clouded);
             light_all += light * before.mixed(step, self.clouded);
             cloudy += light * self.clouded * before.cloud[step];

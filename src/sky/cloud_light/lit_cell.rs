@@ -33,13 +33,13 @@ impl Hidden {
 }
 
 /// The share of a step.
-pub(super) fn share_of(step: usize) -> f64 {
+pub(super) fn fraction_of(step: usize) -> f64 {
     step as f64 / STEPS as f64
 }
 
 /// A value for the share of each step.
-pub(in crate::sky) fn for_each_share(of: impl Fn(f64) -> f64) -> [f64; STEPS + 1] {
-    std::array::from_fn(|step| of(share_of(step)))
+pub(in crate::sky) fn for_each_fraction(of: impl Fn(f64) -> f64) -> [f64; STEPS + 1] {
+    std::array::from_fn(|step| of(fraction_of(step)))
 }
 
 /// A cell of which stars tell, and its light.

@@ -19,7 +19,7 @@ mod terms;
 
 use super::grid::CELLS_OF_A_STAR;
 use fit::CloudLightFit;
-pub(super) use lit_cell::{Hidden, LitCell, for_each_share};
+pub(super) use lit_cell::{Hidden, LitCell, for_each_fraction};
 pub(super) use terms::terms;
 
 /// The light of cells that tells of clouds.
@@ -32,9 +32,9 @@ pub(super) struct CloudLight {
 impl CloudLight {
     /// The light of `cells`, where a part `clouded` of the sky is not clear by its stars; `before` are the
     /// probabilities without any. `None` if light does not tell of clouds.
-    pub(super) fn of(mut cells: Vec<LitCell>, before: &Hidden, clouded: f64) -> Option<Self> {
+    pub(super) fn measure(mut cells: Vec<LitCell>, before: &Hidden, clouded: f64) -> Option<Self> {
         /// What chance may give of the gain of [`Fit::gains`].
-        const LEAST_GAIN: f64 = 6.0;
+        const MIN_GAIN: f64 = 6.0;
         let mut fit = CloudLightFit::of(&mut cells, clouded)?;
         let gains = cells
             .iter()
@@ -43,7 +43,7 @@ impl CloudLight {
                 std::array::from_fn(|i| sum[i] + gains[i])
             });
         // Neighbours share stars.
-        let is_told = |gain: f64| gain > LEAST_GAIN * CELLS_OF_A_STAR;
+        let is_told = |gain: f64| gain > MIN_GAIN * CELLS_OF_A_STAR;
         if !gains.into_iter().all(is_told) {
             return None;
         }
@@ -65,7 +65,7 @@ impl CloudLight {
 
 #[cfg(test)]
 mod tests {
-    use super::lit_cell::{STEPS, share_of};
+    use super::lit_cell::{STEPS, fraction_of};
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -77,7 +77,7 @@ mod tests {
         let mut before = Hidden::NONE;
         before.add(0.0, 1.0, 0.0);
         for step in 1..=STEPS {
-            before.add(share_of(step), 0.0, 1.0 / STEPS as f64);
+            before.add(fraction_of(step), 0.0, 1.0 / STEPS as f64);
         }
         before
     }
@@ -93,7 +93,7 @@ mod tests {
                 let clear = 1.0 + 0.5 * along + 0.005 * random.random_range(-1.0..1.0);
                 let added = if is_cloudy { 0.5 * of_cloud } else { 0.0 };
                 let told_cloudy = is_cloudy != random.random_bool(wrong);
-                let by_stars = for_each_share(|share| {
+                let by_stars = for_each_fraction(|share| {
                     let near = (share - 0.5).abs() < 0.2;
                     let is_untold = cell % 2 == 1;
                     if is_untold || near == told_cloudy {
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn light_tells_of_cells_without_stars() {
         for of_cloud in [0.8, -0.4] {
-            let light = CloudLight::of(cells(of_cloud, 0.05), &before(), 0.4).unwrap();
+            let light = CloudLight::measure(cells(of_cloud, 0.05), &before(), 0.4).unwrap();
             for cell in 0..CELLS {
                 let odds = light.likelihood(cell, 0.5) / light.likelihood(cell, 0.0);
                 assert_eq!(odds > 1.0, cell % 3 == 0, "{of_cloud} {cell} {odds}");
@@ -131,8 +131,8 @@ mod tests {
 
     #[test]
     fn light_that_does_not_go_with_stars_tells_nothing() {
-        assert!(CloudLight::of(cells(0.0, 0.05), &before(), 0.4).is_none());
-        assert!(CloudLight::of(cells(0.8, 0.5), &before(), 0.4).is_none());
-        assert!(CloudLight::of(Vec::new(), &before(), 0.5).is_none());
+        assert!(CloudLight::measure(cells(0.0, 0.05), &before(), 0.4).is_none());
+        assert!(CloudLight::measure(cells(0.8, 0.5), &before(), 0.4).is_none());
+        assert!(CloudLight::measure(Vec::new(), &before(), 0.5).is_none());
     }
 }

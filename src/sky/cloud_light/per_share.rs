@@ -3,7 +3,7 @@
 //! What is usual of clouds tells which cells have some, but not how thick those of this frame are: clouds of an
 //! even thickness would pass for thicker or thinner ones. The stars behind them tell.
 
-use super::lit_cell::{LitCell, STEPS, share_of};
+use super::lit_cell::{LitCell, STEPS, fraction_of};
 use crate::sky::grid::CELLS_OF_A_STAR;
 use std::f64::consts::TAU;
 
@@ -22,7 +22,7 @@ pub(super) struct CloudLightRatio {
 /// A cell with clouds, by its light.
 pub(super) struct CloudyCell<'a> {
     /// The share that its light tells by what was assumed, and the standard error of that.
-    pub share: f64,
+    pub fraction: f64,
     pub sigma: f64,
     /// The cell.
     pub lit: &'a LitCell,
@@ -67,13 +67,13 @@ impl CloudyCell<'_> {
     /// The likelihood of its stars, if its light tells `factor` times the share.
     fn likelihood(&self, factor: f64) -> f64 {
         const FAR_SIGMAS: f64 = 4.0;
-        let (share, sigma) = (factor * self.share, factor * self.sigma);
+        let (share, sigma) = (factor * self.fraction, factor * self.sigma);
         let step_of = |share: f64| (share * STEPS as f64).clamp(0.0, STEPS as f64);
         let first = step_of(share - FAR_SIGMAS * sigma).floor() as usize;
         let last = step_of(share + FAR_SIGMAS * sigma).ceil() as usize;
-        let width = sigma.max(share_of(1));
+        let width = sigma.max(fraction_of(1));
         let weighted = (first..=last).map(|step| {
-            let off = (share_of(step) - share) / width;
+            let off = (fraction_of(step) - share) / width;
             libm::exp(-0.5 * off * off) * self.lit.by_stars[step]
         });
         // The weights of all steps, also of shares that there are not: of these no star tells.
@@ -86,7 +86,7 @@ impl CloudyCell<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lit_cell::{Hidden, for_each_share};
+    use super::super::lit_cell::{Hidden, for_each_fraction};
     use super::*;
 
     /// A cell whose stars tell that clouds take `share` of their light, to within `sigma`.
@@ -94,7 +94,7 @@ mod tests {
         LitCell {
             cell: 0,
             hidden: Hidden::NONE,
-            by_stars: for_each_share(|at| libm::exp(-0.5 * ((at - share) / sigma).powi(2))),
+            by_stars: for_each_fraction(|at| libm::exp(-0.5 * ((at - share) / sigma).powi(2))),
             light: 1.0,
             terms: Vec::new(),
         }
@@ -105,7 +105,7 @@ mod tests {
         let found = |sigma: f64, count: usize| {
             let lit = lit(0.4, sigma);
             let cells = (0..count).map(|_| CloudyCell {
-                share: 0.8,
+                fraction: 0.8,
                 sigma: 0.02,
                 lit: &lit,
             });

@@ -55,7 +55,7 @@ pub(super) fn mean_mag(number: usize) -> f64 {
 }
 
 /// Mean share of a star's light that clouds take in each case.
-pub(super) fn hidden_shares() -> Cases {
+pub(super) fn hidden_fractions() -> Cases {
     std::array::from_fn(|number| {
         let CloudCase { cover, mag, .. } = case(number);
         cover * (1.0 - libm::pow(10.0, -0.4 * mag))

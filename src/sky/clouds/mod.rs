@@ -6,24 +6,24 @@
 //! parts is told by all cells together. Where clouds are brighter or darker than a clear sky, so does their
 //! light (`cloud_light`).
 
-mod belief;
 mod cases;
+mod posterior;
 mod texture;
 
 use super::brightness::SkyLevels;
-use super::cloud_light::{CloudLight, Hidden, LitCell, for_each_share, terms};
+use super::cloud_light::{CloudLight, Hidden, LitCell, for_each_fraction, terms};
 use super::relative_limit::RelativeLimit;
-use super::witnesses::{CellStar, CloudInputs};
+use super::star_counts::{CellStar, CloudInputs};
 use crate::base::statistics::Estimate;
-use belief::{CLEAR_SIGMA_MAG, CellLikelihoods, CloudPosterior};
 pub use cases::CLEAR_MAG;
-use cases::{CASES, CLOUD_VARIATION, Cases, CloudCase, STEP_MAG, STEPS, hidden_shares};
+use cases::{CASES, CLOUD_VARIATION, Cases, CloudCase, STEP_MAG, STEPS, hidden_fractions};
+use posterior::{CLEAR_SIGMA_MAG, CellLikelihoods, CloudPosterior};
 use texture::Texture;
 
 /// Share of stars whose brightness or presence tells nothing: variable stars, wrong names.
 const UNTRUE: f64 = 0.02;
 /// Weight of the stars that tell of a cell at least: without any, nothing is known of it.
-const LEAST_WEIGHT: f64 = 0.3;
+const MIN_WEIGHT: f64 = 0.3;
 /// Stars that should be detected with at least this probability count as expected.
 const EXPECTED: f64 = 0.9;
 
@@ -55,7 +55,7 @@ pub(super) struct CloudMap {
     /// Each cell.
     pub cells: Vec<CellClouds>,
     /// Share of the sky that is behind clouds.
-    pub share: Option<Estimate>,
+    pub fraction: Option<Estimate>,
 }
 
 impl CloudInputs<'_> {
@@ -87,12 +87,12 @@ impl CloudInputs<'_> {
             }
         }
         let mut belief = CloudPosterior::of(&told);
-        let shares = hidden_shares();
+        let shares = hidden_fractions();
         let lit = told
             .iter()
             .filter_map(|told| self.lit(told, levels, belief.hidden(told, &shares)));
         let before = belief.hidden_before(&shares);
-        if let Some(light) = CloudLight::of(lit.collect(), &before, belief.clouded) {
+        if let Some(light) = CloudLight::measure(lit.collect(), &before, belief.clouded) {
             for told in &mut told {
                 let cell = told.cell;
                 told.add(&shares, |share| light.likelihood(cell, share));
@@ -103,7 +103,7 @@ impl CloudInputs<'_> {
             cells[told.cell].clear = Some(clear);
             cells[told.cell].extinction_mag = Some(extinction_mag);
         }
-        let texture = Texture::of(self, witnesses);
+        let texture = Texture::measure(self, witnesses);
         let doubts_mag: Vec<f64> = told
             .iter()
             .map(|told| self.doubt_mag(told.cell, &cells, stars_of[told.cell], levels, &texture))
@@ -124,7 +124,7 @@ impl CloudInputs<'_> {
             [low, clear.unwrap_or(0.5), high]
         };
         CloudMap {
-            share: belief.share(&told, bands),
+            fraction: belief.fraction(&told, bands),
             cells,
         }
     }
@@ -180,7 +180,7 @@ impl CloudInputs<'_> {
                 clouds.detected += usize::from(witness.star.is_detected);
             }
         }
-        let is_told = told > LEAST_WEIGHT && self.depths[cell].is_some();
+        let is_told = told > MIN_WEIGHT && self.depths[cell].is_some();
         is_told.then(|| Around {
             ln_likelihoods: total,
             stars: told * told / squares,
@@ -195,7 +195,7 @@ impl CloudInputs<'_> {
         Some(LitCell {
             cell: told.cell,
             hidden,
-            by_stars: for_each_share(|share| told.likelihood_of(share)),
+            by_stars: for_each_fraction(|share| told.likelihood_of(share)),
             light: levels.radiance_adu_sr(told.cell)?,
             terms: terms(camera, &place, &direction, zenith, self.moon.as_ref()),
         })

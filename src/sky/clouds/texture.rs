@@ -6,7 +6,7 @@
 use super::cases::{CLEAR_MAG, CLOUD_VARIATION};
 use crate::base::statistics::Estimate;
 use crate::sky::neighbor::neighbor;
-use crate::sky::witnesses::{CellStar, CloudInputs};
+use crate::sky::star_counts::{CellStar, CloudInputs};
 
 /// Variance of the extinction from star to star, as in the neighborhood of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,7 +19,7 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Of the clouds over `sky`.
-    pub(super) fn of(sky: &CloudInputs, witnesses: &[CellStar]) -> Self {
+    pub(super) fn measure(sky: &CloudInputs, witnesses: &[CellStar]) -> Self {
         /// Larger differences are those of variable stars and wrong names.
         const LARGEST_MAG: f64 = 1.5;
         /// Pairs that a frame has beforehand.

@@ -27,7 +27,7 @@ pub(super) enum Black {
 
 impl Black {
     /// By `stated`, else by the frame itself.
-    pub fn of(
+    pub fn find(
         frame: &Frame,
         detections: &Detections,
         stated: Option<DarkLevel>,
@@ -81,9 +81,9 @@ impl Black {
                 darkest_adu,
                 cut_by_adu,
             } => {
-                let cut =
-                    cut_by_adu.map(|noise_adu| Cut::of(curve, sky_adu, *darkest_adu, noise_adu));
-                let share = cut.as_ref().map_or(0.0, |cut| cut.share);
+                let cut = cut_by_adu
+                    .map(|noise_adu| Cut::choose(curve, sky_adu, *darkest_adu, noise_adu));
+                let share = cut.as_ref().map_or(0.0, |cut| cut.probability);
                 let above = (probability - share) / (1.0 - share);
                 match cut.filter(|_| above < 0.0) {
                     None => above * curve.light(*darkest_adu),
@@ -116,7 +116,7 @@ impl Black {
 /// What a program may have cut off at the dark end of a picture.
 struct Cut {
     /// How probable it is.
-    share: f64,
+    probability: f64,
     /// The light at most, over that of the sky above level 0.
     most: f64,
 }
@@ -124,7 +124,7 @@ struct Cut {
 impl Cut {
     /// Programs that stretch pictures cut them off some deviations of the noise below the sky. Then the ground is
     /// black.
-    fn of(curve: &ToneCurve, sky_adu: f64, darkest_adu: f64, noise_adu: f64) -> Self {
+    fn choose(curve: &ToneCurve, sky_adu: f64, darkest_adu: f64, noise_adu: f64) -> Self {
         const SIGMAS: f64 = 5.0;
         /// Light of the ground over that of the sky at most.
         const GROUND: f64 = 0.3;
@@ -133,11 +133,11 @@ impl Cut {
         let is_near_black = sky < SIGMAS * noise_adu * curve.light_per_adu(sky_adu);
         match is_near_black && !has_ground {
             true => Self {
-                share: 0.75,
+                probability: 0.75,
                 most: 20.0,
             },
             false => Self {
-                share: 0.25,
+                probability: 0.25,
                 most: 0.5,
             },
         }
@@ -149,7 +149,7 @@ fn darkest_adu(frame: &Frame) -> Option<f64> {
     /// Side of the parts, in pixels.
     const SIDE: usize = 16;
     /// Parts that may be dark by chance.
-    const SHARE: f64 = 0.002;
+    const FRACTION: f64 = 0.002;
     /// Share of black pixels from which on a program may have drawn them.
     const DRAWN: f64 = 0.1;
     let part = |x: usize, y: usize| {
@@ -166,7 +166,7 @@ fn darkest_adu(frame: &Frame) -> Option<f64> {
         .filter_map(|(x, y)| part(x, y))
         .collect();
     levels.sort_unstable_by(f64::total_cmp);
-    let darkest = *levels.get((SHARE * levels.len() as f64) as usize)?;
+    let darkest = *levels.get((FRACTION * levels.len() as f64) as usize)?;
     (darkest >= 0.0).then_some(darkest)
 }
 

@@ -142,7 +142,7 @@ impl CurvedFrame<'_, '_> {
 
     fn black(&self) -> Option<Black> {
         let picture = self.picture;
-        Black::of(
+        Black::find(
             picture.frame,
             self.frame.detections,
             picture.dark,
@@ -184,7 +184,7 @@ impl CurvedFrame<'_, '_> {
     /// that noise makes brighter, or dimmer.
     fn spots(&self, white_adu: f64) -> Vec<Spot> {
         const WANTED: usize = 80;
-        const MOST: usize = 160;
+        const MAX: usize = 160;
         /// Those with larger errors are seen where noise makes them brighter.
         const LARGEST_SIGMAS_MAG: [f64; 3] = [0.06, 0.1, 0.15];
         /// Brighter ones are whole only where noise makes them dimmer. Over white.
@@ -198,7 +198,7 @@ impl CurvedFrame<'_, '_> {
                 * frame.exposure_s.unwrap_or(1.0);
             let flux = libm::pow(10.0, -0.4 * self.clear_sky.instrumental_mag(star));
             let expected = (flux, 1.0 / light_per_flux);
-            let spot = Spot::of(self.picture.frame, star, (reach_px, white_adu), expected)?;
+            let spot = Spot::measure(self.picture.frame, star, (reach_px, white_adu), expected)?;
             let peak_adu = spot.peak_adu(frame.detections.spot_sigma_px);
             (peak_adu < BRIGHTEST_PEAK * white_adu).then_some(spot)
         };
@@ -214,7 +214,7 @@ impl CurvedFrame<'_, '_> {
         chosen.retain(|spot| spot.sigma_mag() < largest_mag);
         // The brightest bend most.
         chosen.sort_by(|a, b| a.v_mag().total_cmp(&b.v_mag()));
-        chosen.truncate(MOST);
+        chosen.truncate(MAX);
         Spot::deviate(&mut chosen);
         Spot::add_light_beyond(&mut chosen);
         chosen
@@ -247,7 +247,7 @@ impl CurvedFrame<'_, '_> {
         }
         let light = |mean: &CurveMean| mean.light(chosen.len());
         let cells: Vec<Option<SkyLight>> = cells.iter().map(light).collect();
-        let zenith = light(&zenith).map(ZenithSky::of);
+        let zenith = light(&zenith).map(ZenithSky::from_light);
         let is_known = zenith.is_some() || cells.iter().any(Option::is_some);
         is_known.then(|| Curved {
             tone: exponent.estimate(chosen.len()).map(|exponent| {
@@ -331,8 +331,8 @@ impl CurveMean {
     /// The mean, with the scatter in its error; `None` where some of `expected` values are missing.
     fn estimate(&self, expected: usize) -> Option<Estimate> {
         /// Share of curves by which there is light at least.
-        const LEAST_SHARE: f64 = 0.9;
-        if self.count == 0 || (self.count as f64) < LEAST_SHARE * expected as f64 {
+        const MIN_FRACTION: f64 = 0.9;
+        if self.count == 0 || (self.count as f64) < MIN_FRACTION * expected as f64 {
             return None;
         }
         let count = self.count as f64;

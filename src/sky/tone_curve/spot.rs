@@ -46,7 +46,7 @@ pub(super) fn reach_px(detections: &Detections) -> f64 {
 
 impl Spot {
     /// The pixels of `star`, of which this flux is expected. `None` at the border, and where they come near to white.
-    pub fn of(
+    pub fn measure(
         frame: &Frame,
         star: &SkyStar,
         (reach_px, white_adu): (f64, f64),

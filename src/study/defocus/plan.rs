@@ -111,7 +111,7 @@ impl DefocusPlan {
         let levels = isoline_levels_px(&errors, &self.required_px);
         let isolines = levels
             .par_iter()
-            .map(|&level| IsoLine::of(&errors, &curves, level))
+            .map(|&level| IsoLine::trace(&errors, &curves, level))
             .collect();
         Ok(StarStudy {
             star: star.clone(),

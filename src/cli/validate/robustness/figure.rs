@@ -53,8 +53,8 @@ fn panel(parameter: VariedParameter, rows: &[SweptRow]) -> Panel {
     let intervals = Marks::Dots(intervals.collect());
     Panel {
         title: "Answers, with 95 % intervals".to_owned(),
-        x: Axis::of(parameter.title()),
-        y: Axis::of("% of the trials").within(0.0, 104.0),
+        x: Axis::new(parameter.title()),
+        y: Axis::new("% of the trials").within(0.0, 104.0),
         layers: vec![
             line("right", RIGHT, |row| row.right),
             PlotLayer::unnamed(RIGHT, intervals),

@@ -110,7 +110,7 @@ pub(super) fn moments_over_field(frame: FieldFrame, stars: &[PsfStar]) -> (Field
     let fits: Vec<(usize, FieldFit)> = models()
         .iter()
         .filter(is_allowed)
-        .filter_map(|model| Some((model.len(), FieldFit::of(&samples, model)?)))
+        .filter_map(|model| Some((model.len(), FieldFit::fit(&samples, model)?)))
         .collect();
     // The scatter that no model explains.
     let of_noise = fits
@@ -147,7 +147,7 @@ struct FieldFit {
 impl FieldFit {
     /// The weighted least-squares fit of a model; stars far off count less. `None` where the stars
     /// do not fix it.
-    fn of(samples: &[MomentSample], model: &[Basis]) -> Option<Self> {
+    fn fit(samples: &[MomentSample], model: &[Basis]) -> Option<Self> {
         /// Rounds of weights.
         const ROUNDS: usize = 4;
         let mut weights: Vec<Moments> = samples

@@ -4,12 +4,12 @@
 //! 1. Bright, isolated stars are fitted with a size and an elongation of their own (`stars`).
 //! 2. These are fitted by polynomials over the field (`field`).
 //! 3. The light of all stars, stretched to one size and elongation, gives the weights of a mixture
-//!    of Gaussians (`lobe_shares`).
+//!    of Gaussians (`component_weights`).
 //! 4. Each half of the stars is compared with the PSF of the other half. The PSF is used where its
 //!    residuals are well below those of a round Gaussian; they give the noise model.
 
+mod component_weights;
 mod field;
-mod lobe_shares;
 mod stars;
 
 use crate::base::statistics::median_of;
@@ -19,8 +19,8 @@ use crate::detect::psf::{
     EffectivePsf, FieldForm, FieldFrame, LocalPsf, MAX_WINDOW_PX, SpotMoments,
 };
 use crate::detect::star_model::{StarModel, noise_of};
+use component_weights::{ComponentEquations, ComponentGrid};
 use field::moments_over_field;
-use lobe_shares::{ComponentEquations, ComponentGrid};
 use stars::{PsfStar, STEPS, StarFitter};
 
 /// Fewer stars than this do not tell the PSF.
@@ -99,10 +99,10 @@ impl SymmetricPsf {
         stars: &mut [PsfStar],
         fitter: &mut StarFitter,
     ) -> Self {
-        let frame = FieldFrame::of(maps.view.size());
+        let frame = FieldFrame::new(maps.view.size());
         let (moments, mut is_varied) = moments_over_field(frame, stars);
         let mut psf = EffectivePsf {
-            lobes: grid.gaussian(),
+            components: grid.gaussian(),
             form: FieldForm::Symmetric,
             typical: grid.typical,
             moments,
@@ -119,7 +119,7 @@ impl SymmetricPsf {
             } else {
                 grid.sums_of_form(psf, &*stars, fitter)
             };
-            psf.lobes = grid.solve(&even.plus(&odd), psf.form);
+            psf.components = grid.solve(&even.plus(&odd), psf.form);
             fitter.place(stars, psf);
             [even, odd]
         };
@@ -151,12 +151,13 @@ impl PsfCandidate {
         fitter: &mut StarFitter,
     ) -> Self {
         let with = |shares: &[f64]| EffectivePsf {
-            lobes: grid.lobes_of(shares),
+            components: grid.components_of(shares),
             ..psf.clone()
         };
-        let shares = grid.shares(&even.plus(odd), psf.form, None);
+        let shares = grid.weights(&even.plus(odd), psf.form, None);
         // The halves are not far from the whole.
-        let of_half = |sums: &ComponentEquations| with(&grid.shares(sums, psf.form, Some(&shares)));
+        let of_half =
+            |sums: &ComponentEquations| with(&grid.weights(sums, psf.form, Some(&shares)));
         let of_halves = [of_half(odd), of_half(even)];
         let mut chi2 = vec![0.0; stars.len()];
         for (half, psf) in of_halves.iter().enumerate() {
@@ -226,7 +227,7 @@ fn of_radial(
     let tried = || stars.iter().step_by(TRIED);
     let [even, odd] = grid.sums_of_form(&start, tried(), fitter);
     let of_tried = even.plus(&odd);
-    psf.lobes = grid.solve(&of_tried, psf.form);
+    psf.components = grid.solve(&of_tried, psf.form);
     // The stars move to the centres of light of such spots.
     let mut moved: Vec<PsfStar> = tried().cloned().collect();
     fitter.place(&mut moved, &psf);
@@ -238,7 +239,7 @@ fn of_radial(
     }
     let others = stars.iter().enumerate().filter(|(i, _)| i % TRIED != 0);
     let [even, odd] = grid.sums_of_form(&start, others.map(|(_, star)| star), fitter);
-    psf.lobes = grid.solve(&of_tried.plus(&even).plus(&odd), psf.form);
+    psf.components = grid.solve(&of_tried.plus(&even).plus(&odd), psf.form);
     let mut stars = stars.to_vec();
     fitter.place(&mut stars, &psf);
     let sums = grid.sums_of_form(&psf, &stars, fitter);

@@ -57,7 +57,7 @@ pub(super) struct StarFitter {
     noise: NoiseModel,
     profiles: NarrowProfiles,
     /// Row by row, as the pixels of the window.
-    shares: Vec<MomentShares>,
+    fractions: Vec<MomentShares>,
     local: LocalPsf,
     /// The spot of all stars, where they have the same.
     common: LocalPsf,
@@ -162,7 +162,7 @@ impl StarFitter {
         }
         let Self {
             profiles,
-            shares,
+            fractions: shares,
             local,
             ..
         } = self;
@@ -172,10 +172,17 @@ impl StarFitter {
         shares.resize(window.groups() * window.height, [[0.0; GROUP_PX]; 6]);
         let place = [spot.x - window.x0 as f64, spot.y - window.y0 as f64];
         if N < PARAMETERS {
-            draw_still_lobes(&local.lobes, place, window.size(), profiles, shares);
+            draw_still_components(&local.components, place, window.size(), profiles, shares);
         } else {
             let here = psf.moments.at(spot.x, spot.y);
-            draw_lobes(&local.lobes, here, place, window.size(), profiles, shares);
+            draw_components(
+                &local.components,
+                here,
+                place,
+                window.size(),
+                profiles,
+                shares,
+            );
         }
     }
 
@@ -190,10 +197,10 @@ impl StarFitter {
         self.common
             .table
             .draw::<LIGHT_BY_PLACE>(place, window.size(), sizes, buffers, drawn);
-        self.shares.clear();
+        self.fractions.clear();
         let placed =
             |[light, by_x, by_y, _]: &ShareGroup| [*light, *by_x, *by_y, empty, empty, empty];
-        self.shares.extend(self.drawn.iter().map(placed));
+        self.fractions.extend(self.drawn.iter().map(placed));
     }
 
     /// The normal equations of the first `N` parameters of a star whose shares were drawn, in ADU.
@@ -202,7 +209,7 @@ impl StarFitter {
         let pixels = WindowPixels::new(window, star.background, &self.noise);
         let mut normal = NormalEquations::empty();
         let flux = (spot.flux * pixels.per_noise) as f32;
-        add_pixels(&mut normal, flux, &self.shares, &pixels);
+        add_pixels(&mut normal, flux, &self.fractions, &pixels);
         let weight = window.background_error.powi(-2);
         normal.matrix[3][3] += weight;
         normal.right[3] -= weight * star.background;
@@ -223,7 +230,7 @@ impl StarFitter {
         let flux = (star.spot.flux * pixels.per_noise) as f32;
         roots.clear();
         values.clear();
-        for (data, shares) in pixels.data.iter().zip(&self.shares) {
+        for (data, shares) in pixels.data.iter().zip(&self.fractions) {
             let root = |lane: usize| {
                 let root = 1.0 / pixels.variance(flux * shares[0][lane]).sqrt();
                 if data[lane].is_nan() { 0.0 } else { root }
@@ -307,7 +314,7 @@ struct ComponentChanges {
 
 /// Adds lobes that have these moments to the pixels of a window, with a spot at this place.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_lobes(
+fn draw_components(
     lobes: &[GaussianComponent],
     moments: SpotMoments,
     [x_px, y_px]: [f64; 2],
@@ -332,13 +339,13 @@ fn draw_lobes(
             moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
             widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
         };
-        add_lobe_with_moments(lobe.share as f32, &changes, profiles, part, into, width);
+        add_component_with_moments(lobe.share as f32, &changes, profiles, part, into, width);
     }
 }
 
 /// The same without the derivatives with respect to the moments.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_still_lobes(
+fn draw_still_components(
     lobes: &[GaussianComponent],
     [x_px, y_px]: [f64; 2],
     size: Size,
@@ -349,7 +356,7 @@ fn draw_still_lobes(
     for lobe in lobes {
         let [dx, dy] = lobe.offset_px;
         let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
-        add_still_lobe(lobe.share as f32, profiles, part, into, width);
+        add_still_component(lobe.share as f32, profiles, part, into, width);
     }
 }
 
@@ -359,7 +366,7 @@ fn draw_still_lobes(
     reason = "lanes of several arrays read best as indices"
 )]
 #[inline(always)]
-fn add_lobe_with_moments(
+fn add_component_with_moments(
     share: f32,
     changes: &ComponentChanges,
     profiles: &NarrowProfiles,
@@ -400,7 +407,7 @@ fn add_lobe_with_moments(
 
 /// Adds a lobe and its derivatives with respect to x and y to the rows of `width` groups.
 #[inline(always)]
-fn add_still_lobe(
+fn add_still_component(
     share: f32,
     profiles: &NarrowProfiles,
     part: LitPart,
@@ -470,7 +477,7 @@ fn first_fit(
         variances: [f64::INFINITY; 3],
         chi2: 0.0,
     };
-    let frame = FieldFrame::of(maps.view.size());
+    let frame = FieldFrame::new(maps.view.size());
     let mut moved = f64::INFINITY;
     for _ in 0..STEPS {
         let before = star.spot;

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 /// Fits of the ridge, with the width held in the first ones: the line is off by up to a cell.
 const FITS: usize = 8;
-const FITS_OF_HELD_WIDTH: usize = 3;
+const FITS_OF_FIXED_WIDTH: usize = 3;
 /// Least standard deviation across, in pixels: of light in one row of them.
 const MIN_SIGMA_PX: f64 = 0.3;
 /// Columns of the fit: level, height, place, direction, width.
@@ -90,7 +90,7 @@ impl<'a> TrailBand<'a> {
     /// The ridge along the line, with its ends; `None` if there is none.
     pub fn ridge(mut self) -> Option<Ridge> {
         for step in 0..FITS {
-            self.fit(step >= FITS_OF_HELD_WIDTH)?;
+            self.fit(step >= FITS_OF_FIXED_WIDTH)?;
             // Broad ones take long, and are no trails.
             if self.sigma_px > self.broadest_px {
                 return None;

@@ -28,7 +28,7 @@ pub(super) struct CellMap {
 
 impl CellMap {
     /// The map of a frame. Cells are as large as a star, or larger where the frame is.
-    pub fn of(search: &TrailSearch<'_>) -> Self {
+    pub fn build(search: &TrailSearch<'_>) -> Self {
         let view = search.view;
         let pixels = (view.width * view.height) as f64;
         let least = (pixels / MAX_CELLS as f64).sqrt().ceil();

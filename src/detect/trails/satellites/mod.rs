@@ -84,7 +84,7 @@ impl Trail {
 impl TrailSearch<'_> {
     /// The trails, most significant first.
     pub fn run(&self) -> Vec<Trail> {
-        let mut cells = CellMap::of(self);
+        let mut cells = CellMap::build(self);
         let mut trails: Vec<Trail> = Vec::new();
         let mut followed = 0;
         for _ in 0..MAX_ROUNDS {

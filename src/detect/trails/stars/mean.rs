@@ -3,15 +3,15 @@
 //! It begins and ends where it falls to half, which is what fixes the middle: clouds, wind and the
 //! motion itself make it uneven, and a bar of uneven light is not centred on its trail.
 
-use super::bar::StreakProfile;
 use super::largest::LargeRegion;
 use super::light::Template;
 use super::profile::{Strip, TrailProfile};
 use super::shape::TrailShape;
+use super::streak_profile::StreakProfile;
 use crate::detect::fit::FrameMaps;
 
 /// Part of the trail at each end whose mean light is the level there,
-const END_SHARE: f64 = 0.25;
+const END_FRACTION: f64 = 0.25;
 /// and the pixels before the end that have it, once it is known where that is about.
 const END_PX: f64 = 6.0;
 /// Least and most that the light changes from their middle to the end, over the light there.
@@ -113,7 +113,7 @@ impl MeanProfile {
     /// towards it, and as it does.
     fn end(&self, side: f64, length_px: f64) -> Option<[f64; 2]> {
         let half = 0.5 * length_px;
-        let inner = half * (1.0 - 2.0 * END_SHARE);
+        let inner = half * (1.0 - 2.0 * END_FRACTION);
         // Noise that falls below the level before the end would be one.
         let smooth = (length_px / 20.0).round().max(1.0);
         let level = self.mean(side, inner, half - 2.0)?;

@@ -1,8 +1,8 @@
 //! From the pieces of trails to detections: one for each star.
 
-use super::bar::StreakProfile;
 use super::profile::{Strip, TrailProfile};
 use super::shape::TrailShape;
+use super::streak_profile::StreakProfile;
 use super::trails::Trails;
 use crate::base::coords::PixelPoint;
 use crate::base::interrupt::Interrupted;
@@ -17,7 +17,7 @@ struct StreakInFrame {
     /// Its middle.
     x: f64,
     y: f64,
-    bar: StreakProfile,
+    streak: StreakProfile,
     /// Whether other trails are next to it.
     is_blended: bool,
     /// Whether one of its pieces is saturated.
@@ -89,7 +89,7 @@ impl StreakInFrame {
             found = Some(Self {
                 x: strip.x + bar.along_px * cos,
                 y: strip.y + bar.along_px * sin,
-                bar,
+                streak: bar,
                 is_blended,
                 is_saturated: peak.saturated,
             });
@@ -107,11 +107,14 @@ impl StreakInFrame {
         };
         let [along, across] = strip.place(peak.x as f64, peak.y as f64);
         across.abs() < shape.half_breadth_px + 1.0
-            && along.abs() < 0.5 * shape.length_px + self.bar.sigma_along_px + shape.half_breadth_px
+            && along.abs()
+                < 0.5 * shape.length_px + self.streak.sigma_along_px + shape.half_breadth_px
     }
 
     fn detection(&self, maps: &FrameMaps<'_>, shape: &TrailShape) -> Detection {
-        let Self { x, y, bar, .. } = *self;
+        let Self {
+            x, y, streak: bar, ..
+        } = *self;
         let [cos, sin] = shape.direction.map(f64::abs);
         let view = &maps.view;
         let half_px = 0.5 * shape.length_px;

@@ -1,11 +1,11 @@
 //! Direction, length and breadth of the trails that a frame's stars are.
 
-use super::bar::StreakProfile;
 use super::largest::{LargeRegion, MAX, largest_regions};
 use super::light::Template;
 use super::mean::{for_each_trail, measure_template};
 use super::profile::{Strip, TrailProfile};
 use super::shape::TrailShape;
+use super::streak_profile::StreakProfile;
 use crate::base::statistics::median;
 use crate::detect::candidates::{Peak, Region};
 use crate::detect::detection::StarTrails;
@@ -16,13 +16,13 @@ use arrayvec::ArrayVec;
 /// Shorter trails are fitted as elongated spots, in pixels.
 const SHORTEST_PX: f64 = 15.0;
 /// Trails longer than this fraction of the frame's shorter side are not stars.
-const LONGEST_SHARE: f64 = 0.25;
+const LONGEST_FRACTION: f64 = 0.25;
 /// Least ratio of length and breadth.
 const MIN_ELONGATION: f64 = 3.0;
 /// Fewer regions do not tell the shape of all.
 const MIN: usize = 5;
 /// Least share of the large regions that are trails in one direction.
-const MIN_SHARE: f64 = 0.6;
+const MIN_FRACTION: f64 = 0.6;
 /// Times that each property is improved with the others.
 const ROUNDS: usize = 3;
 /// Cosine of twice the greatest angle between trails in one direction: 8 degrees.
@@ -42,7 +42,7 @@ impl Trails {
     pub fn measure(maps: &FrameMaps<'_>, peaks: &[Peak], regions: &[Region]) -> Option<Self> {
         let largest = largest_regions(maps, peaks, regions);
         let long: ArrayVec<_, MAX> = largest.iter().filter(|large| is_long(large)).collect();
-        let fewest = MIN.max((MIN_SHARE * largest.len() as f64).ceil() as usize);
+        let fewest = MIN.max((MIN_FRACTION * largest.len() as f64).ceil() as usize);
         if long.len() < fewest {
             return None;
         }
@@ -66,7 +66,7 @@ impl Trails {
             length_px: median(&mut lengths_px),
             half_breadth_px: 2.0 * maps.width_px(),
         };
-        let longest_px = LONGEST_SHARE * maps.view.width.min(maps.view.height) as f64;
+        let longest_px = LONGEST_FRACTION * maps.view.width.min(maps.view.height) as f64;
         let is_possible = |shape: &TrailShape| (SHORTEST_PX..longest_px).contains(&shape.length_px);
         let mut shape = Some(shape)
             .filter(is_possible)

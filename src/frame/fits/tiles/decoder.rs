@@ -7,9 +7,9 @@ use super::method::{Method, Values};
 use super::quantize::{Dither, Quantized};
 use super::table::{TileColumn, TileTable};
 use crate::frame::FrameError;
-use crate::frame::account::{PIXELS_BETWEEN_CHECKS, ReadBudget};
 use crate::frame::fits::error::{malformed, unsupported};
 use crate::frame::fits::unit::{FitsUnit, StoredType};
+use crate::frame::read_budget::{PIXELS_BETWEEN_CHECKS, ReadBudget};
 
 /// All that the tiles of one image have in common.
 pub(super) struct Decoder<'a> {
@@ -42,9 +42,9 @@ enum TileParameter<T> {
 impl<'a> Decoder<'a> {
     pub fn new(unit: &FitsUnit, table: TileTable<'a>) -> Result<Self, FrameError> {
         let header = &unit.header;
-        let method = Method::of(header, unit.stored)?;
+        let method = Method::parse(header, unit.stored)?;
         let quantization = if unit.stored.is_float() {
-            Quantization::of(unit, &table)?
+            Quantization::parse(unit, &table)?
         } else {
             None
         };
@@ -209,7 +209,7 @@ fn exactly(bytes: Vec<u8>, count: usize, width: usize) -> Result<Vec<u8>, TileEr
 
 impl Quantization {
     /// How the floats of the image were quantized; `None` if they were not.
-    fn of(unit: &FitsUnit, table: &TileTable) -> Result<Option<Self>, FrameError> {
+    fn parse(unit: &FitsUnit, table: &TileTable) -> Result<Option<Self>, FrameError> {
         let header = &unit.header;
         let source = |name| -> Result<Option<TileParameter<f64>>, FrameError> {
             match table.column(name) {

@@ -4,7 +4,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.2.
 
 use super::error::TileError;
-use crate::frame::account::ReadBudget;
+use crate::frame::read_budget::ReadBudget;
 use flate2::bufread::MultiGzDecoder;
 use std::io::Read;
 

@@ -6,10 +6,10 @@ use super::hcompress::Hcompress;
 use super::rice::{Rice, RiceWidth};
 use super::{gzip, plio};
 use crate::frame::FrameError;
-use crate::frame::account::ReadBudget;
 use crate::frame::fits::error::{malformed, unsupported};
 use crate::frame::fits::header::UnitHeader;
 use crate::frame::fits::unit::StoredType;
+use crate::frame::read_budget::ReadBudget;
 
 /// A compression (ZCMPTYPE) and its parameters (ZNAMEn, ZVALn).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ pub(super) enum Values {
 
 impl Method {
     /// The compression of the image with this header, whose pixels are `stored`.
-    pub fn of(header: &UnitHeader, stored: StoredType) -> Result<Self, FrameError> {
+    pub fn parse(header: &UnitHeader, stored: StoredType) -> Result<Self, FrameError> {
         const EXPECTED: &str =
             "GZIP_1, GZIP_2 or NOCOMPRESS, or RICE_1, HCOMPRESS_1 or PLIO_1 of at most 32 bits";
         let Some(name) = header.text("ZCMPTYPE") else {
@@ -161,7 +161,7 @@ fn rice(header: &UnitHeader) -> Result<Rice, FrameError> {
     // The defaults are the standard's.
     let block = parameter(header, "BLOCKSIZE")?.unwrap_or(32.0);
     let bytes = parameter(header, "BYTEPIX")?.unwrap_or(4.0);
-    let width = RiceWidth::of(bytes as i64).ok_or_else(|| {
+    let width = RiceWidth::from_byte_count(bytes as i64).ok_or_else(|| {
         let found = format!("{bytes} bytes a pixel (BYTEPIX) in tiles compressed with RICE_1");
         unsupported(found, "1, 2 or 4")
     })?;

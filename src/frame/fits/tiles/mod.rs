@@ -28,7 +28,7 @@ mod table;
 
 use super::error::{malformed, truncated};
 use super::unit::FitsUnit;
-use crate::frame::account::ReadBudget;
+use crate::frame::read_budget::ReadBudget;
 use crate::frame::{FrameError, MAX_PIXELS};
 use decoder::Decoder;
 use error::TileError;

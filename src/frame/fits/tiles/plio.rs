@@ -18,7 +18,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.3; D. Tody, IRAF's pixel list format.
 
 use super::error::TileError;
-use crate::frame::account::ReadBudget;
+use crate::frame::read_budget::ReadBudget;
 
 /// Instructions between two looks at the time. Each gives 4095 pixels or fewer.
 const WORDS_BETWEEN_CHECKS: usize = 256;

@@ -9,7 +9,7 @@
 //! FITS Standard 4.0 (2018), sect. 10.4.1. R. Rice, P.-S. Yeh and W. Miller 1993, AIAA-93-4541.
 
 use super::error::TileError;
-use crate::frame::account::{PIXELS_BETWEEN_CHECKS, ReadBudget};
+use crate::frame::read_budget::{PIXELS_BETWEEN_CHECKS, ReadBudget};
 
 /// Parameters of a stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,7 @@ pub(super) enum RiceWidth {
 
 impl RiceWidth {
     /// The width of `bytes`, if streams have it.
-    pub fn of(bytes: i64) -> Option<Self> {
+    pub fn from_byte_count(bytes: i64) -> Option<Self> {
         match bytes {
             1 => Some(Self::One),
             2 => Some(Self::Two),
@@ -123,7 +123,7 @@ struct RiceBits<'a> {
     /// The next bits, from the highest; zeros after them.
     buffer: u64,
     /// How many bits of the buffer are of the stream.
-    held: u32,
+    buffered: u32,
 }
 
 impl<'a> RiceBits<'a> {
@@ -131,7 +131,7 @@ impl<'a> RiceBits<'a> {
         Self {
             rest: data,
             buffer: 0,
-            held: 0,
+            buffered: 0,
         }
     }
 
@@ -139,20 +139,20 @@ impl<'a> RiceBits<'a> {
     #[inline]
     fn fill(&mut self) {
         if let Some((word, _)) = self.rest.split_first_chunk() {
-            self.buffer |= u64::from_be_bytes(*word) >> self.held;
-            let bytes = (63 - self.held) / 8;
+            self.buffer |= u64::from_be_bytes(*word) >> self.buffered;
+            let bytes = (63 - self.buffered) / 8;
             self.rest = &self.rest[bytes as usize..];
-            self.held += bytes * 8;
+            self.buffered += bytes * 8;
             // Bits beyond those that count as held are of a byte that is read again.
-            self.buffer &= !(u64::MAX >> self.held);
+            self.buffer &= !(u64::MAX >> self.buffered);
             return;
         }
-        while self.held <= 56 {
+        while self.buffered <= 56 {
             let Some((byte, rest)) = self.rest.split_first() else {
                 return;
             };
-            self.buffer |= u64::from(*byte) << (56 - self.held);
-            self.held += 8;
+            self.buffer |= u64::from(*byte) << (56 - self.buffered);
+            self.buffered += 8;
             self.rest = rest;
         }
     }
@@ -160,15 +160,15 @@ impl<'a> RiceBits<'a> {
     #[inline]
     fn drop(&mut self, count: u32) {
         self.buffer <<= count;
-        self.held -= count;
+        self.buffered -= count;
     }
 
     /// The next `count` bits, at most 32, as a number.
     #[inline]
     fn take(&mut self, count: u32) -> Option<u32> {
-        if self.held < count {
+        if self.buffered < count {
             self.fill();
-            if self.held < count {
+            if self.buffered < count {
                 return None;
             }
         }
@@ -181,15 +181,15 @@ impl<'a> RiceBits<'a> {
     /// A number whose high bits are a count of zeros before a one, and then `low` bits, at most 24.
     #[inline]
     fn take_split(&mut self, low: u32) -> Option<u32> {
-        if self.held < 32 {
+        if self.buffered < 32 {
             self.fill();
         }
         let zeros = self.buffer.leading_zeros();
         let used = zeros + 1 + low;
-        if used <= self.held {
+        if used <= self.buffered {
             let after = self.buffer << zeros << 1;
             self.buffer = after << low;
-            self.held -= used;
+            self.buffered -= used;
             // In two steps, because a shift by 64 is none.
             let low_bits = after >> 1 >> (63 - low);
             return Some(zeros << low | low_bits as u32);
@@ -202,10 +202,10 @@ impl<'a> RiceBits<'a> {
     fn take_long(&mut self, low: u32) -> Option<u32> {
         let mut high = 0_u32;
         while self.buffer == 0 {
-            high = high.wrapping_add(self.held);
-            self.held = 0;
+            high = high.wrapping_add(self.buffered);
+            self.buffered = 0;
             self.fill();
-            if self.held == 0 {
+            if self.buffered == 0 {
                 return None;
             }
         }
@@ -270,7 +270,7 @@ mod tests {
             bytes in 0_i64..5,
             (block, count) in (1_usize..70, 0_usize..500),
         ) {
-            if let Some(width) = RiceWidth::of(bytes)
+            if let Some(width) = RiceWidth::from_byte_count(bytes)
                 && let Ok(pixels) = (Rice { block, width }).decode(&data, count, &ReadBudget::default()) {
                 prop_assert_eq!(pixels.len(), count);
             }

@@ -123,7 +123,7 @@ const SIGNATURES: [(&[u8], UnsupportedFormat); 21] = [
 ];
 
 /// The format of `bytes`, if it is one that is known but not read.
-pub(super) fn of(bytes: &[u8]) -> Option<UnsupportedFormat> {
+pub(super) fn detect(bytes: &[u8]) -> Option<UnsupportedFormat> {
     let by_signature = SIGNATURES
         .iter()
         .find(|(start, _)| bytes.starts_with(start));
@@ -169,7 +169,7 @@ fn of_riff(bytes: &[u8]) -> Option<UnsupportedFormat> {
 pub(super) fn raw_tiff(bytes: &[u8]) -> Option<UnsupportedFormat> {
     const CFA: u64 = 32803;
     const REDUCED_IMAGE: u64 = 1;
-    let first = TiffFile::of(bytes).ok()?.directories().next()?.ok()?;
+    let first = TiffFile::parse(bytes).ok()?.directories().next()?.ok()?;
     let is = |tag: u16, value: u64| first.first(tag, 0).is_ok_and(|found| found == value);
     if first.has(50706) {
         return Some(raw("a raw file in Adobe's format (DNG)"));
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     fn name(bytes: &[u8]) -> &'static str {
-        of(bytes).map_or("", |foreign| foreign.name)
+        detect(bytes).map_or("", |foreign| foreign.name)
     }
 
     fn boxed(main: &[u8; 4], compatible: &[u8]) -> Vec<u8> {
@@ -243,8 +243,8 @@ mod tests {
         ] {
             assert!(!name(bytes).contains("HEIC"), "{bytes:?}");
         }
-        assert_eq!(of(b"RIFF\x24\0\0\0WAVEfmt "), None);
-        assert_eq!(of(b"text of no format"), None);
+        assert_eq!(detect(b"RIFF\x24\0\0\0WAVEfmt "), None);
+        assert_eq!(detect(b"text of no format"), None);
     }
 
     /// A TIFF file of one directory: tags with a long each, and the maker at the end.

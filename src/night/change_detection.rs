@@ -30,7 +30,7 @@ pub(super) struct DetectedChange {
 }
 
 /// Where `values` depart by `least_step` or more. Values that are not known are passed over.
-pub(super) fn departures(values: &[Option<f64>], least_step: f64) -> Vec<DetectedChange> {
+pub(super) fn find_changes(values: &[Option<f64>], least_step: f64) -> Vec<DetectedChange> {
     let known = values.iter().enumerate();
     let known: Vec<(usize, f64)> = known
         .filter_map(|(at, value)| Some((at, (*value)?)))
@@ -97,7 +97,7 @@ mod tests {
             start: 10,
             end: Some(15),
         };
-        assert_eq!(departures(&values, 0.2), [expected]);
+        assert_eq!(find_changes(&values, 0.2), [expected]);
     }
 
     #[test]
@@ -106,8 +106,8 @@ mod tests {
         values[7] = Some(9.0);
         values[20] = Some(9.0);
         values[21] = Some(9.0);
-        assert!(departures(&values, 0.2).is_empty());
-        assert!(departures(&[], 0.2).is_empty());
+        assert!(find_changes(&values, 0.2).is_empty());
+        assert!(find_changes(&[], 0.2).is_empty());
     }
 
     #[test]
@@ -117,7 +117,7 @@ mod tests {
             // The sum of 12 is as good as normal.
             let noise = |_| Some((0..12).map(|_| random.random_range(-0.5..0.5)).sum());
             let values: Vec<Option<f64>> = (0..300).map(noise).collect();
-            assert!(departures(&values, 0.0).is_empty());
+            assert!(find_changes(&values, 0.0).is_empty());
         }
     }
 }

@@ -36,9 +36,9 @@ pub(super) struct CommonElongation {
 
 impl CommonElongation {
     /// Nothing is known of the stars in a frame of this size.
-    pub fn of(size: Size) -> Self {
+    pub fn new(size: Size) -> Self {
         Self {
-            field: FieldFrame::of(size),
+            field: FieldFrame::new(size),
             sums: [[0.0; 2]; 2],
             radial: [0.0; 2],
         }
@@ -104,7 +104,7 @@ impl CommonElongation {
 }
 
 /// Whether the stars depart from round Gaussians of one size. `stars` have free sizes.
-pub(super) fn is_departure(
+pub(super) fn are_non_gaussian(
     elongation: &CommonElongation,
     noise: &NoiseModel,
     stars: &[SpotFit],

@@ -105,8 +105,8 @@ fn paired(
 ) -> (Vec<StarMatch>, f64) {
     /// The distance in standard errors, and at least.
     const SIGMAS: f64 = 4.0;
-    const LEAST_PX: f64 = 1.5;
-    let radius_px = (SIGMAS * position_sigma_px).max(LEAST_PX);
+    const MIN_PX: f64 = 1.5;
+    let radius_px = (SIGMAS * position_sigma_px).max(MIN_PX);
     let [width_px, height_px] = [view.camera.width_px, view.camera.height_px];
     let density_px2 = detections.sources.len() as f64 / (width_px * height_px);
     let p_chance = 1.0 - libm::exp(-density_px2 * PI * radius_px * radius_px);

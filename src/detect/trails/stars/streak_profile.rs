@@ -24,7 +24,7 @@ pub(super) struct StreakProfile {
 /// Distance between the places that are tried, in pixels, …
 const STEP_PX: f64 = 0.25;
 /// … and over the length of long bars.
-const STEP_SHARE: f64 = 1.0 / 400.0;
+const STEP_FRACTION: f64 = 1.0 / 400.0;
 /// Error of the place that even bright trails have, in pixels: the motion is not even.
 const MIN_ERROR_PX: f64 = 0.1;
 
@@ -40,13 +40,13 @@ impl StreakProfile {
     ) -> Option<Self> {
         let even = ProfileSums::of(profile);
         let range_px = 0.5 * shape.length_px + margin_px;
-        let step_px = STEP_PX.max(STEP_SHARE * shape.length_px);
+        let step_px = STEP_PX.max(STEP_FRACTION * shape.length_px);
         let tries = (2.0 * range_px / step_px).floor() as usize;
         let along_px = |i: usize| -range_px + i as f64 * step_px;
         let step = |i: usize| along_px(i) + profile.middle as f64;
         let fitted = |i: usize| match template {
             Some(template) => template.fitted(profile, step(i)),
-            None => even.bar(step(i), shape.length_px),
+            None => even.streak(step(i), shape.length_px),
         };
         let gains: Vec<f64> = (0..=tries).map(|i| fitted(i).gain()).collect();
         let best = (0..=tries)
@@ -106,7 +106,7 @@ impl ProfileSums {
     }
 
     /// The bar of this length around a place, counted in steps from the first one's middle.
-    fn bar(&self, middle: f64, length_px: f64) -> FittedTrail {
+    fn streak(&self, middle: f64, length_px: f64) -> FittedTrail {
         // Step i is from i − ½ to i + ½.
         let ends = [
             middle - 0.5 * length_px + 0.5,

@@ -22,7 +22,7 @@ const BROKEN: [f64; KINDS] = [1.0, 1.0, 2.0];
 /// Variation of clear air, in magnitudes.
 pub(super) const CLEAR_SIGMA_MAG: f64 = 0.05;
 /// No cell is more certain of clouds, or of a clear sky, than by this factor.
-const MOST_ODDS: f64 = 1000.0;
+const MAX_ODDS: f64 = 1000.0;
 
 /// A cell of which stars tell.
 #[derive(Debug, Clone)]
@@ -173,7 +173,7 @@ impl CloudPosterior {
 
     /// Share of the sky of which stars tell that is behind clouds, by the probabilities that cells are clear, with
     /// their bands.
-    pub(super) fn share(
+    pub(super) fn fraction(
         &self,
         told: &[CellLikelihoods],
         clear: impl Fn(&CellLikelihoods) -> [f64; 3],
@@ -241,8 +241,8 @@ impl CasePriors {
             clear: sums(&self.clear),
             cloud: sums(&self.cloud),
         };
-        evidence.clear = evidence.clear.at_least(evidence.cloud.all / MOST_ODDS);
-        evidence.cloud = evidence.cloud.at_least(evidence.clear.all / MOST_ODDS);
+        evidence.clear = evidence.clear.at_least(evidence.cloud.all / MAX_ODDS);
+        evidence.cloud = evidence.cloud.at_least(evidence.clear.all / MAX_ODDS);
         evidence
     }
 
@@ -316,7 +316,7 @@ mod tests {
     use super::*;
 
     /// A cell in which extinctions about `cloud_mag` are as likely as `odds` to those about zero.
-    fn told(cell: usize, cloud_mag: f64, odds: f64) -> CellLikelihoods {
+    fn evidence(cell: usize, cloud_mag: f64, odds: f64) -> CellLikelihoods {
         let logs = std::array::from_fn(|case| {
             let about = |mag: f64| libm::exp(-0.5 * ((mean_mag(case) - mag) / 0.1).powi(2));
             libm::log(about(0.0) + odds * about(cloud_mag) + 1e-9)
@@ -324,11 +324,11 @@ mod tests {
         CellLikelihoods::new(cell, 0.01, &logs)
     }
 
-    fn share_of(belief: &CloudPosterior, all: &[CellLikelihoods]) -> Option<Estimate> {
+    fn fraction_of(belief: &CloudPosterior, all: &[CellLikelihoods]) -> Option<Estimate> {
         let clear: Vec<f64> = belief.cells().map(|(clear, _)| clear).collect();
         let bands = all.iter().map(|told| belief.clear_band(told, 0.05));
         let bands: Vec<[f64; 2]> = bands.collect();
-        belief.share(all, |told| {
+        belief.fraction(all, |told| {
             let at = all
                 .iter()
                 .position(|other| other.cell == told.cell)
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn broken_clouds_may_leave_a_cell_clear_that_smooth_ones_do_not() {
         let cells: Vec<CellLikelihoods> = (0..100)
-            .map(|cell| told(cell, 0.3, if cell < 50 { 1e-3 } else { 1e4 }))
+            .map(|cell| evidence(cell, 0.3, if cell < 50 { 1e-3 } else { 1e4 }))
             .collect();
         let belief = CloudPosterior::of(&cells);
         for (told, (clear, _)) in cells.iter().zip(belief.cells()) {
@@ -356,20 +356,20 @@ mod tests {
         let cells = |clear: usize, cloudy: usize| -> Vec<CellLikelihoods> {
             let odds = |cell: usize| if cell < clear { 1e-3 } else { 1e4 };
             (0..clear + cloudy)
-                .map(|cell| told(cell, 1.0, odds(cell)))
+                .map(|cell| evidence(cell, 1.0, odds(cell)))
                 .collect()
         };
         let mostly_clear = cells(90, 10);
         let belief = CloudPosterior::of(&mostly_clear);
-        let share = share_of(&belief, &mostly_clear).unwrap();
+        let share = fraction_of(&belief, &mostly_clear).unwrap();
         assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
         assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
         // The same cell is more likely clear where most of the sky is.
-        let doubtful = belief.priors.evidence(&told(0, 1.0, 10.0), CLEAR_MAG);
+        let doubtful = belief.priors.evidence(&evidence(0, 1.0, 10.0), CLEAR_MAG);
         let (clear, _) = doubtful.posterior(belief.clouded);
         let (less, _) = doubtful.posterior(CloudPosterior::of(&cells(10, 90)).clouded);
         assert!(clear > less + 0.3, "{clear} {less}");
-        assert_eq!(share_of(&CloudPosterior::of(&[]), &[]), None);
+        assert_eq!(fraction_of(&CloudPosterior::of(&[]), &[]), None);
     }
 
     #[test]
@@ -377,13 +377,13 @@ mod tests {
         let cells = |cloud_mag: f64| -> Vec<CellLikelihoods> {
             let odds = |cell: usize| if cell.is_multiple_of(3) { 20.0 } else { 0.05 };
             (0..300)
-                .map(|cell| told(cell, cloud_mag, odds(cell)))
+                .map(|cell| evidence(cell, cloud_mag, odds(cell)))
                 .collect()
         };
         let thin = cells(0.4);
-        let share = share_of(&CloudPosterior::of(&thin), &thin).unwrap();
+        let share = fraction_of(&CloudPosterior::of(&thin), &thin).unwrap();
         assert!((share.value - 0.33).abs() < 0.1, "{share:?}");
         let usual = CloudPosterior::with(&thin, 1.0);
-        assert!(share_of(&usual, &thin).unwrap().value < share.value);
+        assert!(fraction_of(&usual, &thin).unwrap().value < share.value);
     }
 }

@@ -66,12 +66,12 @@ impl CloudInputs<'_> {
     }
 
     /// The stars in cells whose depth is known.
-    pub(super) fn witnesses(&self) -> Vec<CellStar<'_>> {
-        let witness = |star| self.witness(star);
+    pub(super) fn star_counts(&self) -> Vec<CellStar<'_>> {
+        let witness = |star| self.star_count(star);
         self.stars.iter().filter_map(witness).collect()
     }
 
-    fn witness<'s>(&self, star: &'s SkyStar) -> Option<CellStar<'s>> {
+    fn star_count<'s>(&self, star: &'s SkyStar) -> Option<CellStar<'s>> {
         let cell = self.grid.cell_of(&star.pixel, &star.direction)?;
         let limit_adu = self.frame.flux_limit_adu(&star.pixel)?;
         let limit_mag = instrumental_mag(limit_adu / self.levels.exposure_s);

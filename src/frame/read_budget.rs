@@ -18,7 +18,7 @@ pub(super) const FLOATS_BYTES_PER_PIXEL: usize = 2 * size_of::<f32>();
 #[derive(Debug, Default)]
 pub(super) struct ReadBudget {
     limit: MemoryLimit,
-    held_bytes: Cell<u64>,
+    booked_bytes: Cell<u64>,
     interrupt: Interrupt,
     channel: Option<usize>,
     has_colors: Cell<bool>,
@@ -58,21 +58,21 @@ impl ReadBudget {
     /// # Errors
     /// [`FrameError::OutOfMemory`] if there is no room for it.
     pub fn hold(&self, bytes: u64) -> Result<(), FrameError> {
-        let held = self.held_bytes.get().saturating_add(bytes);
+        let held = self.booked_bytes.get().saturating_add(bytes);
         if held > self.limit.bytes() {
             return Err(FrameError::OutOfMemory {
                 needed_bytes: held,
                 limit_bytes: self.limit.bytes(),
             });
         }
-        self.held_bytes.set(held);
+        self.booked_bytes.set(held);
         Ok(())
     }
 
     /// Books that so much is held no longer.
     pub fn release(&self, bytes: u64) {
-        let held = self.held_bytes.get().saturating_sub(bytes);
-        self.held_bytes.set(held);
+        let held = self.booked_bytes.get().saturating_sub(bytes);
+        self.booked_bytes.set(held);
     }
 
     /// Makes room for `length` bytes in all in `bytes`, whose capacity is booked.
@@ -118,7 +118,7 @@ impl ReadBudget {
 
     /// What may be held beside all that is booked.
     pub fn left_bytes(&self) -> u64 {
-        self.limit.bytes().saturating_sub(self.held_bytes.get())
+        self.limit.bytes().saturating_sub(self.booked_bytes.get())
     }
 
     /// Refuses an image for which there is no room: reading it takes so many bytes for each of its
@@ -135,7 +135,7 @@ impl ReadBudget {
         Err(FrameError::TooMuchMemory {
             width,
             height,
-            needed_bytes: needed_bytes.saturating_add(self.held_bytes.get()),
+            needed_bytes: needed_bytes.saturating_add(self.booked_bytes.get()),
             limit_bytes: self.limit.bytes(),
         })
     }

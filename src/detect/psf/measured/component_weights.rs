@@ -12,19 +12,19 @@ use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Standard deviation of a lobe over that of the spot along its shorter axis.
-const LOBE_SIZE: f64 = 0.55;
+const COMPONENT_SIZE: f64 = 0.55;
 /// A lobe is not larger than this, in pixels: the pixels blur the edges of a spot no more.
-const MAX_LOBE_PX: f64 = 0.65;
+const MAX_COMPONENT_PX: f64 = 0.65;
 /// Where that would be too many lobes, they are larger, up to this over that of the spot.
-const MAX_LOBE_SIZE: f64 = 0.85;
+const MAX_COMPONENT_SIZE: f64 = 0.85;
 /// Distance of the lobes over their standard deviation: a sum of such lobes has no ripples.
 const PITCH: f64 = 1.15;
 /// Half axes of the ellipse of the lobes, in standard deviations of the spot.
 const REACH_SIGMAS: f64 = 2.8;
 /// Most lobes.
-const MAX_LOBES: f64 = 120.0;
+const MAX_COMPONENTS: f64 = 120.0;
 /// Lobes with a smaller share are left out.
-const MIN_SHARE: f64 = 1.5e-3;
+const MIN_WEIGHT: f64 = 1.5e-3;
 
 /// The lobes that a PSF may have.
 #[derive(Debug, Clone)]
@@ -50,9 +50,9 @@ impl ComponentGrid {
         let minor_px = libm::exp(typical[0] - 0.5 * elongation);
         let ratio = libm::exp(elongation);
         let area_px2 = std::f64::consts::PI * REACH_SIGMAS.powi(2) * ratio * minor_px.powi(2);
-        let wanted_px = (LOBE_SIZE * minor_px).min(MAX_LOBE_PX);
-        let least_px = (area_px2 / MAX_LOBES).sqrt() / PITCH;
-        let sigma_px = wanted_px.max(least_px).min(MAX_LOBE_SIZE * minor_px);
+        let wanted_px = (COMPONENT_SIZE * minor_px).min(MAX_COMPONENT_PX);
+        let least_px = (area_px2 / MAX_COMPONENTS).sqrt() / PITCH;
+        let sigma_px = wanted_px.max(least_px).min(MAX_COMPONENT_SIZE * minor_px);
         let pitch_px = PITCH * sigma_px;
         let total = covariance(typical);
         let outline = inverse(total);
@@ -117,7 +117,7 @@ impl ComponentGrid {
     }
 
     /// The shares of a Gaussian, which are expected before the stars tell.
-    fn expected_shares(&self) -> Vec<f64> {
+    fn expected_weights(&self) -> Vec<f64> {
         let share = |sigmas: &f64| libm::exp(-0.5 * sigmas * sigmas);
         let mut shares: Vec<f64> = self.distances.iter().map(share).collect();
         let sum: f64 = shares.iter().sum();
@@ -127,12 +127,12 @@ impl ComponentGrid {
 
     /// The lobes of a Gaussian.
     pub fn gaussian(&self) -> Vec<FieldComponent> {
-        let shares = self.expected_shares();
-        self.with_shares(&[&shares, &shares])
+        let shares = self.expected_weights();
+        self.with_weights(&[&shares, &shares])
     }
 
     /// The lobes that have light, with shares at the centre and in the corners.
-    fn with_shares(&self, [centre, corner]: &[&[f64]; 2]) -> Vec<FieldComponent> {
+    fn with_weights(&self, [centre, corner]: &[&[f64]; 2]) -> Vec<FieldComponent> {
         let [in_centre, in_corner] = [centre, corner].map(|shares| shares.iter().sum::<f64>());
         let lobe = |((lobe, centre), corner): ((&GaussianComponent, &f64), &f64)| FieldComponent {
             lobe: GaussianComponent {
@@ -142,7 +142,7 @@ impl ComponentGrid {
             corner_share: corner / in_corner,
         };
         let lobes = self.lobes.iter().zip(*centre).zip(*corner).map(lobe);
-        let has_light = |l: &FieldComponent| l.lobe.share.max(l.corner_share) > MIN_SHARE;
+        let has_light = |l: &FieldComponent| l.lobe.share.max(l.corner_share) > MIN_WEIGHT;
         lobes.filter(has_light).collect()
     }
 
@@ -157,7 +157,7 @@ impl ComponentGrid {
         classes: &[usize],
         fitter: &mut StarFitter,
     ) -> [ComponentEquations; 2] {
-        let classes = ImageClasses::of(classes);
+        let classes = ImageClasses::new(classes);
         let mut of_halves = [(); 2].map(|()| LaneSums::new(psf.form, &classes));
         let mut images = ComponentImages::default();
         let mut local = LocalPsf::default();
@@ -166,14 +166,14 @@ impl ComponentGrid {
             corner_share: lobe.share,
         });
         let all = EffectivePsf {
-            lobes: every_lobe.collect(),
+            components: every_lobe.collect(),
             ..psf.clone()
         };
         fitter.tabulate(psf);
         for (number, star) in stars.into_iter().enumerate() {
             let (x_px, y_px) = (star.spot.x, star.spot.y);
             fitter.weigh(star, psf, &mut images.roots, &mut images.values);
-            all.place_lobes(x_px, y_px, &mut local);
+            all.place_components(x_px, y_px, &mut local);
             images.draw(star, &local, &classes);
             let outward = psf.moments.frame.distance(x_px, y_px);
             of_halves[number % 2].add(&images, outward);
@@ -209,25 +209,25 @@ impl ComponentGrid {
 
     /// The shares that fit best: of the centre, and where the PSF changes of the corners. The search
     /// begins with `near` ones where there are any.
-    pub fn shares(
+    pub fn weights(
         &self,
         sums: &ComponentEquations,
         form: FieldForm,
         near: Option<&[f64]>,
     ) -> Vec<f64> {
-        let expected = self.expected_shares();
+        let expected = self.expected_weights();
         sums.solve(&expected, near, &self.classes(form))
     }
 
     /// The lobes that have light, with these [`Self::shares`].
-    pub fn lobes_of(&self, shares: &[f64]) -> Vec<FieldComponent> {
+    pub fn components_of(&self, shares: &[f64]) -> Vec<FieldComponent> {
         let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
-        self.with_shares(&[&shares[..self.lobes.len()], corner])
+        self.with_weights(&[&shares[..self.lobes.len()], corner])
     }
 
     /// The lobes that fit best.
     pub fn solve(&self, sums: &ComponentEquations, form: FieldForm) -> Vec<FieldComponent> {
-        self.lobes_of(&self.shares(sums, form, None))
+        self.components_of(&self.weights(sums, form, None))
     }
 }
 
@@ -235,14 +235,14 @@ impl ComponentGrid {
 #[derive(Debug, Clone)]
 struct ImageClasses {
     /// The image that each lobe is a part of.
-    of_lobes: Vec<usize>,
+    of_components: Vec<usize>,
     /// The first lobe of each image.
-    first_lobes: Vec<usize>,
+    first_components: Vec<usize>,
 }
 
 impl ImageClasses {
     /// An image for each class of lobes.
-    fn of(classes: &[usize]) -> Self {
+    fn new(classes: &[usize]) -> Self {
         let (of_lobes, _) = ranks(classes);
         let mut first_lobes = Vec::new();
         for (lobe, image) in of_lobes.iter().enumerate() {
@@ -251,14 +251,14 @@ impl ImageClasses {
             }
         }
         Self {
-            of_lobes,
-            first_lobes,
+            of_components: of_lobes,
+            first_components: first_lobes,
         }
     }
 
     /// Number of images, empty ones included that fill the last block.
     fn padded_count(&self) -> usize {
-        self.first_lobes.len().next_multiple_of(BLOCK)
+        self.first_components.len().next_multiple_of(BLOCK)
     }
 }
 
@@ -301,11 +301,11 @@ impl ComponentImages {
         self.light.resize(count / BLOCK * pixels, empty);
         let flux = (spot.flux / window.noise_adu) as f32;
         let place = [spot.x - window.x0 as f64, spot.y - window.y0 as f64];
-        draw_weighted_lobes(
+        draw_weighted_components(
             self,
             flux,
-            &local.lobes,
-            &classes.of_lobes,
+            &local.components,
+            &classes.of_components,
             place,
             window.size(),
         );
@@ -332,7 +332,7 @@ impl ComponentImages {
 
 /// Adds lobes to the images that they are a part of, with a spot at this place in a window of this size.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn draw_weighted_lobes(
+fn draw_weighted_components(
     images: &mut ComponentImages,
     flux: f32,
     lobes: &[GaussianComponent],
@@ -357,14 +357,14 @@ fn draw_weighted_lobes(
             (*first, *end) = ((*first).min(of_first), (*end).max(of_end));
         }
         let block = &mut light[image / BLOCK * pixels..][..pixels];
-        add_weighted_lobe(flux, profiles, part, block, roots, image % BLOCK, *width);
+        add_weighted_component(flux, profiles, part, block, roots, image % BLOCK, *width);
     }
 }
 
 /// Adds a lobe to the image of this number of a block, in rows of `width` groups, times the square
 /// roots of the weights.
 #[inline(always)]
-fn add_weighted_lobe(
+fn add_weighted_component(
     flux: f32,
     profiles: &NarrowProfiles,
     part: LitPart,
@@ -550,14 +550,15 @@ impl ComponentEquations {
             right[class] += weight * share;
         }
         for (set, of_set) in self.right.iter().enumerate() {
-            let class =
-                |set: usize, image: usize| class_of[set * lobes + self.images.first_lobes[image]];
-            for i in 0..self.images.first_lobes.len() {
+            let class = |set: usize, image: usize| {
+                class_of[set * lobes + self.images.first_components[image]]
+            };
+            for i in 0..self.images.first_components.len() {
                 let at = class(set, i);
                 right[at] += of_set[i];
                 for other in 0..self.right.len() {
                     let products = &self.products[set + other];
-                    for j in 0..self.images.first_lobes.len() {
+                    for j in 0..self.images.first_components.len() {
                         matrix[(class(other, j), at)] += products[(i.min(j), i.max(j))];
                     }
                 }
