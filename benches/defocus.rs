@@ -11,8 +11,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use starpipe::Interrupt;
 use starpipe::camera::data_sheet::Preset;
-use starpipe::model::defocus::{Centroiding, EnergyStudy, PeakStudy};
-use starpipe::model::sensitivity::Scenario;
+use starpipe::lab::defocus::{Centroiding, EnergyStudy, PeakStudy};
+use starpipe::predict::Scenario;
 use std::hint::black_box;
 
 fn points(criterion: &mut Criterion) {

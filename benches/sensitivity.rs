@@ -11,8 +11,8 @@ use starpipe::base::coords::{Rotation, UnitVector};
 use starpipe::camera::data_sheet::Preset;
 use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
-use starpipe::model::sensitivity::{Budget, Detector, Rule, Scenario};
-use starpipe::model::simulate::{Pointing, Scene, Simulator};
+use starpipe::lab::simulate::{Pointing, Scene, Simulator};
+use starpipe::predict::{Budget, Detector, Rule, Scenario};
 use std::hint::black_box;
 
 fn prediction(criterion: &mut Criterion) {

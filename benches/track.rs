@@ -9,9 +9,9 @@ use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::Frame;
 use starpipe::identify::IndexedCatalog;
-use starpipe::model::sensitivity::Scenario;
-use starpipe::model::simulate::{Pointing, Scene, Simulator};
+use starpipe::lab::simulate::{Pointing, Scene, Simulator};
 use starpipe::pipeline::Context;
+use starpipe::predict::Scenario;
 use starpipe::track::{Mode, Tracker};
 use std::hint::black_box;
 

@@ -2,7 +2,7 @@
 //! `cargo run --release --no-default-features --features built-in-catalog --example limiting_magnitude`
 
 use starpipe::camera::data_sheet::Preset;
-use starpipe::model::sensitivity::{Extinction, Prediction, Scenario, ScenarioError};
+use starpipe::predict::{Extinction, Prediction, Scenario, ScenarioError};
 
 /// What to change of a scenario, and how it is called.
 type Change = (&'static str, fn(&mut Scenario));

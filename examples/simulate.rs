@@ -9,8 +9,8 @@
 use starpipe::camera::data_sheet::Preset;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{FitsHeader, FitsSamples, TiffOptions, TiffSamples, write_fits, write_tiff};
-use starpipe::model::sensitivity::Scenario;
-use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::lab::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::predict::Scenario;
 use starpipe::{Catalog, Rotation, UnitVector};
 use std::error::Error;
 use std::fs::File;

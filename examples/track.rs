@@ -8,9 +8,9 @@
 use starpipe::camera::data_sheet::Preset;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, FrameError};
-use starpipe::model::sensitivity::Scenario;
-use starpipe::model::simulate::{Pointing, Setup, Simulator};
+use starpipe::lab::simulate::{Pointing, Setup, Simulator};
 use starpipe::nalgebra::Vector3;
+use starpipe::predict::Scenario;
 use starpipe::{Catalog, Context, Frame, IndexedCatalog, Rotation, Track, Tracker, UnitVector};
 use std::error::Error;
 

@@ -11,7 +11,7 @@
 //! ```text
 //! file ─ frame ─ calibration ─ detect ─ identify ─ photometry ─ report
 //!                                │         │           │
-//!                             sources   catalog    model:
+//!                             sources   catalog   predict:
 //!                                      of stars   what should
 //!                                                  be seen
 //! ```
@@ -49,7 +49,7 @@
 //! | [`calibration`] | what the detector does to a frame: darks, flats, hot pixels |
 //! | [`detect`](mod@detect) | where is light: background, threshold, centroids |
 //! | [`identify`](mod@identify) | which stars, which attitude, or why not; which lens, from several frames |
-//! | [`model`] | what should be seen: sensitivity, defocus, simulated frames |
+//! | [`predict`] | what should be seen: the sensitivity model |
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`sky`] | how bright is the sky, how clear, and how faint do stars go at each place |
 //! | [`centroids`] | what does a list of centroids hold |
@@ -58,7 +58,7 @@
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
 //! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
-//! | `study` | is it good enough: validation, robustness, defocus, the papers' experiments |
+//! | [`lab`] | is it good enough: simulated frames, validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].
 //!
@@ -84,15 +84,14 @@ pub mod detect;
 pub mod ephemeris;
 pub mod frame;
 pub mod identify;
-pub mod model;
+pub mod lab;
 #[doc(hidden)]
 pub mod night;
 pub mod photometry;
 pub mod pipeline;
+pub mod predict;
 pub mod report;
 pub mod sky;
-#[doc(hidden)]
-pub mod study;
 pub mod track;
 
 pub use base::clock::UtcOffset;

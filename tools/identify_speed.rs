@@ -14,8 +14,8 @@ use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, StarField, Workspace,
 };
+use starpipe::lab::robustness::{Answer, SimulatedCentroids, TrialProtocol};
 use starpipe::pipeline::star_field;
-use starpipe::study::robustness::{Answer, SimulatedCentroids, TrialProtocol};
 use std::error::Error;
 use std::f64::consts::SQRT_2;
 use std::time::Instant;

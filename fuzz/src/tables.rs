@@ -5,7 +5,7 @@ use starpipe::archive::names_in;
 use starpipe::calibration::read_hot_pixels;
 use starpipe::camera::data_sheet::{DataSheet, Response, SpotImage};
 use starpipe::catalog::Catalog;
-use starpipe::study::validation::store::RunTables;
+use starpipe::lab::validation::store::RunTables;
 use starpipe::{IndexedCatalog, Interrupt};
 use std::fs;
 use std::path::Path;

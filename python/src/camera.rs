@@ -3,8 +3,8 @@
 use crate::errors::exception;
 use pyo3::prelude::*;
 use starpipe::camera::data_sheet::{CameraDescription, DataSheet, Preset};
-use starpipe::model::sensitivity::{Parameter, Reading, Scenario};
-use starpipe::model::simulate::{Scene, Setup, SetupParameter};
+use starpipe::lab::simulate::{Scene, Setup, SetupParameter};
+use starpipe::predict::{Parameter, Reading, Scenario};
 use std::path::{Path, PathBuf};
 
 /// A parameter's name and its value.

@@ -34,7 +34,8 @@ impl DarkFrames {
             buffers.set_interrupt(interrupt.clone());
             let frame = source.frame(&name, None, &mut buffers);
             let frame = frame.map_err(exception)?.as_stored();
-            let statistics = FrameStatistics::measure(&name.display().to_string(), &frame, exposure_s);
+            let statistics =
+                FrameStatistics::measure(&name.display().to_string(), &frame, exposure_s);
             stack.add(&frame, statistics).map_err(exception)
         })
     }

@@ -9,12 +9,12 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde::Serialize;
 use starpipe::identify::Photometry;
-use starpipe::model::sensitivity::PredictionRow;
-use starpipe::study::defocus::{Caller, DarkNoise, DefocusReport, Noise, DefocusPlan};
-use starpipe::study::robustness::{
-    ProtocolCase, CaseResult, Mirrored, TrialProtocol, TrialResults, run_one, standard_cases,
+use starpipe::lab::robustness::{
+    CaseResult, Mirrored, ProtocolCase, TrialProtocol, TrialResults, run_one, standard_cases,
 };
-use starpipe::study::validation::{self, Accumulator, FrameRecord, StarRecord, Validator};
+use starpipe::lab::spot_radius::{Caller, DarkNoise, DefocusPlan, DefocusReport, Noise};
+use starpipe::lab::validation::{self, Accumulator, FrameRecord, StarRecord, Validator};
+use starpipe::predict::PredictionRow;
 use starpipe::{Catalog, Interrupted, Workspace};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;

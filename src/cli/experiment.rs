@@ -10,8 +10,8 @@ use super::output::rows::json_line;
 use super::progress::frames_bar;
 use clap::Args;
 use starpipe::identify::IndexedCatalog;
+use starpipe::lab::experiment::{ExperimentRun, Published, TrialSettings, run};
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
-use starpipe::study::experiment::{ExperimentRun, Published, TrialSettings, run};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

@@ -31,6 +31,6 @@ impl MeasuredMagnitude {
 }
 
 /// −2.5 log10(`flux`): the magnitude without zero point.
-pub(crate) fn instrumental_mag(flux: f64) -> f64 {
+pub fn instrumental_mag(flux: f64) -> f64 {
     -2.5 * libm::log10(flux)
 }

@@ -28,7 +28,7 @@ pub mod zero_point;
 pub(crate) use association::{filter_response, resolved_px};
 pub(crate) use color_frame::{ColorFrame, PictureColors};
 pub(crate) use identified_frame::IdentifiedFrame;
-pub(crate) use measured::instrumental_mag;
+pub use measured::instrumental_mag;
 
 use crate::base::statistics::median_of;
 use crate::catalog::StarIndex;

@@ -12,8 +12,8 @@ use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{
     DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion,
 };
-use crate::model::sensitivity::Extinction;
 use crate::photometry::comparison::ObservingSetup;
+use crate::predict::Extinction;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 

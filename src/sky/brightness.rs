@@ -11,8 +11,8 @@ use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::statistics::{Estimate, median_of};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::detect::{BackgroundMap, least_cell_px};
-use crate::model::sensitivity::SkyBrightness;
 use crate::photometry::{IdentifiedFrame, MAG_PER_RELATIVE, instrumental_mag};
+use crate::predict::SkyBrightness;
 use std::f64::consts::PI;
 
 /// Full width at half maximum of what a meter of the sky's brightness sees, in degrees.

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{IndexedCatalog, Priors, SearchFailure, StarField, Workspace};
-use starpipe::study::robustness::{SimulatedCentroids, TrialProtocol};
+use starpipe::lab::robustness::{SimulatedCentroids, TrialProtocol};
 
 fn allocations(work: impl FnOnce()) -> u64 {
     allocation_counter::measure(work).count_total

@@ -9,8 +9,8 @@ use starpipe::base::coords::PixelPoint;
 use starpipe::camera::data_sheet::{DataSheet, Imperfections, Preset, Response};
 use starpipe::detect::{DetectConfig, Detection, Workspace, detect};
 use starpipe::frame::Frame;
-use starpipe::model::sensitivity::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
-use starpipe::model::simulate::star_field;
+use starpipe::lab::simulate::star_field;
+use starpipe::predict::{Budget, Detector, Extinction, Rule, Scenario, SkyBrightness};
 
 /// Side of the frames, in pixels.
 const SIDE_PX: usize = 1024;

@@ -9,9 +9,7 @@ use serde_json::Value;
 use starpipe::catalog::StarIndex;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{Priors, identify};
-use starpipe::study::robustness::{
-    Answer, Mirrored, SimulatedCentroids, TrialProtocol, TrialResult,
-};
+use starpipe::lab::robustness::{Answer, Mirrored, SimulatedCentroids, TrialProtocol, TrialResult};
 
 fn draw(protocol: &TrialProtocol, seed: u64) -> SimulatedCentroids {
     SimulatedCentroids::draw(protocol, sky(), &mut ChaCha8Rng::seed_from_u64(seed))

@@ -3,8 +3,8 @@
 use starpipe::base::coords::PixelPoint;
 use starpipe::camera::data_sheet::Preset;
 use starpipe::frame::Frame;
-use starpipe::model::sensitivity::{Budget, Scenario};
-use starpipe::model::simulate::star_field;
+use starpipe::lab::simulate::star_field;
+use starpipe::predict::{Budget, Scenario};
 
 /// Tolerance of measured means and variances, in standard errors.
 const SIGMAS: f64 = 4.5;

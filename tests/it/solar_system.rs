@@ -6,8 +6,8 @@ use starpipe::catalog::{Star, StarId};
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::ephemeris::solar_system::{Body, BodyKind, TimeError, bodies_at};
 use starpipe::identify::{DateSource, FrameDate, IndexedCatalog};
-use starpipe::model::sensitivity::Scenario;
-use starpipe::model::simulate::{Pointing, Scene, Simulator};
+use starpipe::lab::simulate::{Pointing, Scene, Simulator};
+use starpipe::predict::Scenario;
 use starpipe::{Context, FrameReport, ObservationDate, Solution, Workspace, solve_frame};
 
 /// A date, a planet in front of the stars then, and its place by JPL (DE421; DE405 for the last),

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use starpipe::base::coords::PixelPoint;
 use starpipe::camera::data_sheet::{DataSheet, Preset, SpotForm};
 use starpipe::detect::{DetectConfig, Detection, Detections, Workspace, detect};
-use starpipe::model::sensitivity::{Scenario, StarLight};
-use starpipe::model::simulate::star_field;
+use starpipe::lab::simulate::star_field;
+use starpipe::predict::{Scenario, StarLight};
 
 /// Detections and true stars lie within this distance, in pixels.
 const MATCH_PX: f64 = 3.0;

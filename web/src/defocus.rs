@@ -4,7 +4,7 @@ use crate::stated::Stated;
 use crate::{json, progress, told};
 use serde::Deserialize;
 use starpipe::Interrupt;
-use starpipe::study::defocus::{Caller, DefocusReport, Noise, DefocusPlan};
+use starpipe::lab::spot_radius::{Caller, DefocusPlan, DefocusReport, Noise};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wasm_bindgen::prelude::*;
 

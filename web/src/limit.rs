@@ -4,7 +4,7 @@ use crate::stated::Stated;
 use crate::{catalogs, json, told};
 use serde::{Deserialize, Serialize};
 use starpipe::camera::data_sheet::Preset;
-use starpipe::model::sensitivity::{Parameter, PredictionRow, Scenario, Spacing, Sweep};
+use starpipe::predict::{Parameter, PredictionRow, Scenario, Spacing, Sweep};
 use wasm_bindgen::prelude::*;
 
 /// The prediction for a camera, as `starpipe limit --format json` prints it. Until the catalog was given,

@@ -4,8 +4,8 @@ use crate::stated::Stated;
 use crate::{catalogs, json, told};
 use serde::Serialize;
 use starpipe::ephemeris::places::StarPlaces;
-use starpipe::model::sensitivity::{Budget, Prediction, Scenario};
-use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth, camera_of};
+use starpipe::lab::simulate::{Pointing, Setup, Simulator, Truth, camera_of};
+use starpipe::predict::{Budget, Prediction, Scenario};
 use starpipe::{Frame, Rotation, Star, UnitVector};
 use wasm_bindgen::prelude::*;
 

@@ -3,8 +3,8 @@
 use crate::told;
 use serde::Deserialize;
 use starpipe::camera::data_sheet::Preset;
-use starpipe::model::sensitivity::{Parameter, Reading, Scenario};
-use starpipe::model::simulate::{Setup, SetupParameter};
+use starpipe::lab::simulate::{Setup, SetupParameter};
+use starpipe::predict::{Parameter, Reading, Scenario};
 use std::collections::BTreeMap;
 use wasm_bindgen::JsError;
 

@@ -8,7 +8,7 @@ use crate::cli::options::values;
 use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
 use clap::{Args, ValueEnum};
-use starpipe::model::defocus::Centroiding;
+use starpipe::lab::defocus::Centroiding;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -10,8 +10,8 @@ use starpipe::calibration::darks::{
 };
 use starpipe::camera::data_sheet::DataSheet;
 use starpipe::frame::Frame;
-use starpipe::model::sensitivity::Scenario;
-use starpipe::study::defocus::DarkNoise;
+use starpipe::lab::spot_radius::DarkNoise;
+use starpipe::predict::Scenario;
 use std::path::{Path, PathBuf};
 
 /// Exposures that differ by more than this part have different dark currents.

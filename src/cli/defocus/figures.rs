@@ -7,10 +7,8 @@ use crate::cli::plot::{
 };
 use plotters::style::RGBColor;
 use starpipe::base::format::five_digits;
-use starpipe::model::defocus::{
-    ErrorCurve, ErrorPoint, ExpectedError, IsoLine, PeakStudy, Surface,
-};
-use starpipe::study::defocus::{
+use starpipe::lab::defocus::{ErrorCurve, ErrorPoint, ExpectedError, IsoLine, PeakStudy, Surface};
+use starpipe::lab::spot_radius::{
     DefocusReport, DefocusStar, DefocusStarReport, PredictedError, StarStudy,
 };
 

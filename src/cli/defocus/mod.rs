@@ -16,8 +16,8 @@ use super::output::messages::report_warning;
 use super::output::rows::{json_indented, json_line};
 use super::progress::bar;
 use starpipe::Interrupt;
-use starpipe::model::defocus::DefocusLens;
-use starpipe::study::defocus::{Caller, DefocusPlan, DefocusReport, StarStudy};
+use starpipe::lab::defocus::DefocusLens;
+use starpipe::lab::spot_radius::{Caller, DefocusPlan, DefocusReport, StarStudy};
 use std::path::PathBuf;
 use tables::{curve_table, grid_table};
 

@@ -5,8 +5,8 @@ use super::tables::curve_table;
 use super::{figures, plan};
 use crate::cli::page::{figure, options, table};
 use starpipe::base::format::five_digits;
+use starpipe::lab::spot_radius::{DefocusReport, DefocusStarReport, StarStudy};
 use starpipe::report::page::{Fact, PageContent, PageFigure};
-use starpipe::study::defocus::{DefocusReport, DefocusStarReport, StarStudy};
 
 /// The page of the results; `notes` are what was warned of.
 pub(super) fn build(

@@ -5,12 +5,12 @@ use super::darks::dark_noise;
 use crate::cli::exit::CommandError;
 use crate::cli::output::messages::report_warning;
 use anyhow::{Error, anyhow};
-use starpipe::model::defocus::{Centroiding, DefocusLens, EnergyStudy, PeakStudy, SpotNoiseGrid};
-use starpipe::model::sensitivity::Scenario;
-use starpipe::study::defocus::{
+use starpipe::lab::defocus::{Centroiding, DefocusLens, EnergyStudy, PeakStudy, SpotNoiseGrid};
+use starpipe::lab::spot_radius::{
     BRIGHTER_THAN_LIMIT_MAG, DarkNoise, DefocusError, DefocusPlan, DefocusStar, Noise, NoiseError,
     default_v_mag,
 };
+use starpipe::predict::Scenario;
 
 /// The plan that the options ask for.
 pub(super) fn plan(

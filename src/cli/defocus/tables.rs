@@ -1,7 +1,7 @@
 //! The tables of a study as CSV.
 
 use crate::cli::output::rows::csv_table;
-use starpipe::study::defocus::{DefocusReport, GridRow, StarStudy};
+use starpipe::lab::spot_radius::{DefocusReport, GridRow, StarStudy};
 
 /// A row for each point of the grid.
 pub(super) fn grid_table(studies: &[StarStudy]) -> anyhow::Result<String> {

@@ -6,7 +6,7 @@ use crate::cli::options::steps::named_steps;
 use crate::cli::page::HtmlOption;
 use crate::cli::plot::PlotFile;
 use clap::{ArgGroup, Args};
-use starpipe::model::sensitivity;
+use starpipe::predict;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -50,14 +50,14 @@ pub(crate) struct LimitArgs {
 
 /// A sweep of the prediction.
 #[derive(Debug, Clone)]
-pub(crate) struct LimitSweep(pub(crate) sensitivity::Sweep);
+pub(crate) struct LimitSweep(pub(crate) predict::Sweep);
 
 impl FromStr for LimitSweep {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, steps) = named_steps(text)?;
-        sensitivity::Sweep::new(&name, steps.ends, steps.count, steps.spacing)
+        predict::Sweep::new(&name, steps.ends, steps.count, steps.spacing)
             .map(Self)
             .map_err(|error| error.to_string())
     }

@@ -6,7 +6,7 @@ use crate::cli::plot::{
 };
 use anyhow::Context;
 use starpipe::base::format::five_digits;
-use starpipe::model::sensitivity::{
+use starpipe::predict::{
     Budget, CurveValues, PaperFigure, Scenario, Spacing, Sweep, SweepCurve, curves,
 };
 

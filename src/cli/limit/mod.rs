@@ -13,7 +13,7 @@ use super::output::files::{write_each, write_into};
 use super::output::overwrite::is_same_file;
 use super::output::rows::{csv_table, json_lines};
 use anyhow::Context;
-use starpipe::model::sensitivity::{PredictionRow, Scenario};
+use starpipe::predict::{PredictionRow, Scenario};
 use std::path::{Path, PathBuf};
 
 /// More sweeps than this are a mistake; a figure of them would be unreadable.

@@ -7,7 +7,7 @@ use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, figure, options, table};
 use starpipe::base::format::five_digits;
 use starpipe::catalog::Catalog;
-use starpipe::model::sensitivity::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
+use starpipe::predict::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
 use starpipe::report::page::{Fact, PageContent};
 
 const PAPER: &str =

@@ -4,7 +4,7 @@ use super::args::LimitArgs;
 use crate::cli::exit::CommandError;
 use crate::cli::output::messages::report_warning;
 use starpipe::catalog::Catalog;
-use starpipe::model::sensitivity::{PredictionRow, Scenario};
+use starpipe::predict::{PredictionRow, Scenario};
 
 /// The prediction for the scenario, or for each value of the sweeps.
 pub(super) fn predict(

@@ -3,7 +3,7 @@
 use clap::{Arg, ArgMatches, Command, Error, FromArgMatches};
 use starpipe::base::format::five_digits as number;
 use starpipe::camera::data_sheet::{NumberRange, Response, ResponseError, is_curve};
-use starpipe::model::sensitivity::{Conditions, Parameter, Scenario};
+use starpipe::predict::{Conditions, Parameter, Scenario};
 use std::path::PathBuf;
 
 /// The parameters given, in the order in which they have to be set.

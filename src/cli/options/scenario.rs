@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use starpipe::camera::data_sheet::{DataSheet, Preset};
-use starpipe::model::sensitivity::{Reading, Scenario, ScenarioError};
+use starpipe::predict::{Reading, Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]

@@ -8,8 +8,8 @@ use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, Error, FromArgMa
 use starpipe::base::format::five_digits as number;
 use starpipe::camera::Projection;
 use starpipe::camera::data_sheet::SpotForm;
-use starpipe::model::sensitivity::{Scenario, ScenarioError};
-use starpipe::model::simulate::{Scene, Setup, SetupParameter};
+use starpipe::lab::simulate::{Scene, Setup, SetupParameter};
+use starpipe::predict::{Scenario, ScenarioError};
 
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("simulated").args(["camera", "preset"]).required(true))]

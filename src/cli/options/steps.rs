@@ -1,7 +1,7 @@
 //! Values of a sweep, typed as FROM:TO:COUNT[:log].
 
 use super::values::{finite, not_of_form, whole};
-use starpipe::model::sensitivity::Spacing;
+use starpipe::predict::Spacing;
 use std::str::FromStr;
 
 /// First and last value, their number, and how they are spaced.

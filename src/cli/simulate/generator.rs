@@ -7,8 +7,8 @@ use starpipe::catalog::Catalog;
 use starpipe::ephemeris::observer::Site;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{Frame, FrameError, FrameMetadata};
-use starpipe::model::simulate::{Pointing, Setup, Simulator, Truth};
-use starpipe::study::validation::draw;
+use starpipe::lab::simulate::{Pointing, Setup, Simulator, Truth};
+use starpipe::lab::validation::draw;
 
 /// Simulates frames of one subject with one camera.
 pub(super) struct Generator<'a> {

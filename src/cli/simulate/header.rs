@@ -4,8 +4,8 @@ use super::generator::{GeneratedFrame, Generator};
 use super::subject::FrameSubject;
 use starpipe::frame::{FitsHeader, RowOrder};
 use starpipe::identify::SkyView;
-use starpipe::model::sensitivity::Reading;
-use starpipe::model::simulate::SetupParameter;
+use starpipe::lab::simulate::SetupParameter;
+use starpipe::predict::Reading;
 use starpipe::report::wcs;
 
 /// Describes a frame.

@@ -22,8 +22,8 @@ use generator::Generator;
 use header::Description;
 use record::SimulationRecord;
 use starpipe::ephemeris::places::StarPlaces;
-use starpipe::model::sensitivity::{Budget, Detector, Rule};
-use starpipe::model::simulate::{Simulator, truth_table};
+use starpipe::lab::simulate::{Simulator, truth_table};
+use starpipe::predict::{Budget, Detector, Rule};
 use std::ops::ControlFlow;
 use subject::FrameSubject;
 

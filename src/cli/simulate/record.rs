@@ -4,7 +4,7 @@ use super::generator::{GeneratedFrame, Generator};
 use serde::Serialize;
 use starpipe::base::coords::{Camera, Icrs, Rotation};
 use starpipe::base::units::DEG_PER_RAD;
-use starpipe::model::simulate::TrueStar;
+use starpipe::lab::simulate::TrueStar;
 use std::path::Path;
 
 /// The printed facts of a frame.

@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use starpipe::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use starpipe::centroids::CentroidListOptions;
 use starpipe::identify::Photometry;
-use starpipe::model::simulate::{Scene, Setup};
+use starpipe::lab::simulate::{Scene, Setup};
 use std::path::Path;
 
 /// What the frames show.

@@ -9,7 +9,7 @@ use crate::cli::page::HtmlOption;
 use crate::cli::plot::FigureForm;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Arg, Args};
-use starpipe::study::validation::ValidationProtocol;
+use starpipe::lab::validation::ValidationProtocol;
 use std::path::PathBuf;
 
 /// Suites by name. `validate --suite NAME` is the hidden command `validate-NAME`, as each has options of its own.

@@ -3,7 +3,7 @@
 use crate::cli::plot::{Axis, BLUE, Dot, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use plotters::style::RGBColor;
 use starpipe::base::statistics::normal_density;
-use starpipe::study::validation::{
+use starpipe::lab::validation::{
     AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
     IdentificationSummary, Pull, PullSummary, StudyRow, ValidationSummary,
 };

@@ -1,10 +1,10 @@
 //! What a page shows of the frames of runs: rows of a table, and small pictures of those that failed.
 
 use serde::Serialize;
+use starpipe::lab::robustness::Answer;
+use starpipe::lab::validation::store::RunTables;
+use starpipe::lab::validation::{FrameRecord, Validator};
 use starpipe::report::page::Thumbnail;
-use starpipe::study::robustness::Answer;
-use starpipe::study::validation::store::RunTables;
-use starpipe::study::validation::{FrameRecord, Validator};
 
 /// Rows of a table on a page; frames.csv has all of them.
 pub(super) const MOST_ROWS: usize = 5000;

@@ -25,8 +25,8 @@ use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use args::RunOptions;
 use shared::Shared;
+use starpipe::lab::validation::{HARD_SUITE, HardRow, StudyRow};
 use starpipe::report::page::{PageContent, Thumbnail};
-use starpipe::study::validation::{HARD_SUITE, HardRow, StudyRow};
 use std::cell::Cell;
 
 /// `starpipe validate` without a suite

@@ -9,9 +9,9 @@ use crate::cli::plot::Sheet;
 use serde::Serialize;
 use starpipe::base::format::{counted, five_digits};
 use starpipe::catalog::Catalog;
+use starpipe::lab::night_sky::SkySummary;
+use starpipe::lab::validation::{HardRow, Pull, StudyRow, ValidationSummary};
 use starpipe::report::page::{Fact, PageContent, PageTable};
-use starpipe::study::night_sky::SkySummary;
-use starpipe::study::validation::{HardRow, Pull, StudyRow, ValidationSummary};
 use std::collections::BTreeMap;
 
 const FAILED: &str = "Frames that failed";

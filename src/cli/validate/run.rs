@@ -9,12 +9,12 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::files::remove_outdated;
 use crate::cli::output::rows::json_indented;
 use serde::Serialize;
-use starpipe::pipeline::Workspace;
-use starpipe::study::StudyError;
-use starpipe::study::validation::store::{
+use starpipe::lab::StudyError;
+use starpipe::lab::validation::store::{
     FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
-use starpipe::study::validation::{ValidationProtocol, ValidationSummary, Validator};
+use starpipe::lab::validation::{ValidationProtocol, ValidationSummary, Validator};
+use starpipe::pipeline::Workspace;
 use std::path::Path;
 use std::time::Instant;
 

@@ -7,10 +7,10 @@ use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::rows::{csv_table, json_indented};
 use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use starpipe::ephemeris::observer::Site;
+use starpipe::lab::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
+use starpipe::lab::validation::ValidationProtocol;
+use starpipe::lab::validation::store::claim_directory;
 use starpipe::pipeline::Workspace;
-use starpipe::study::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
-use starpipe::study::validation::ValidationProtocol;
-use starpipe::study::validation::store::claim_directory;
 use std::path::Path;
 
 /// Where the frames are taken.

@@ -6,10 +6,8 @@ use super::sweep::StudySweep;
 use super::{figures, run};
 use crate::cli::exit::CommandError;
 use crate::cli::output::rows::{csv_table, json_indented};
-use starpipe::model::sensitivity::Spacing;
-use starpipe::study::validation::{
-    StudyParameter, StudyRow, ValidationProtocol, ValidationSummary,
-};
+use starpipe::lab::validation::{StudyParameter, StudyRow, ValidationProtocol, ValidationSummary};
+use starpipe::predict::Spacing;
 use std::path::Path;
 
 /// One value of one parameter.

@@ -5,7 +5,7 @@ use super::shared::Shared;
 use super::study::run_each;
 use crate::cli::exit::CommandError;
 use crate::cli::output::rows::{csv_table, json_indented};
-use starpipe::study::validation::{HARD_SUITE, HardRow, ValidationProtocol};
+use starpipe::lab::validation::{HARD_SUITE, HardRow, ValidationProtocol};
 use std::path::Path;
 
 /// Does the runs of all cases, one after the other, and writes a table of them.

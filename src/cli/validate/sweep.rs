@@ -2,8 +2,8 @@
 
 use crate::cli::options::steps::named_steps;
 use crate::cli::options::values::field_of_view;
-use starpipe::model::sensitivity::Spacing;
-use starpipe::study::validation::StudyParameter;
+use starpipe::lab::validation::StudyParameter;
+use starpipe::predict::Spacing;
 use std::str::FromStr;
 
 /// Values of one parameter.

@@ -3,7 +3,7 @@
 use super::measurement::{FrameMeasurement, ObservingSetup};
 use crate::base::statistics::Estimate;
 use crate::base::units::ARCSEC_PER_RAD;
-use crate::model::sensitivity::Budget;
+use crate::predict::Budget;
 use std::fmt;
 
 /// One contradiction between a frame and the stated camera.

@@ -3,8 +3,8 @@
 use crate::base::statistics::Estimate;
 use crate::camera::data_sheet::DataSheet;
 use crate::detect::DetectConfig;
-use crate::model::sensitivity::Extinction;
 use crate::photometry::zero_point::WeightedColor;
+use crate::predict::Extinction;
 
 /// The camera with which a frame was taken, as stated by the user.
 #[derive(Debug, Clone, PartialEq)]

@@ -26,9 +26,7 @@ use super::SUN_BV_MAG;
 use super::zero_point::{REFERENCE_BV_MAG, WeightedColor};
 use crate::base::statistics::{Estimate, median};
 use crate::camera::data_sheet::lens_transmission;
-use crate::model::sensitivity::{
-    Budget, Detector, Faintest, Rule, Scenario, SkyBrightness, StarLight,
-};
+use crate::predict::{Budget, Detector, Faintest, Rule, Scenario, SkyBrightness, StarLight};
 
 /// The prediction for a camera, and its differences from a frame.
 #[derive(Debug, Clone, PartialEq)]

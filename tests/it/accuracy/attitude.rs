@@ -12,9 +12,9 @@ use starpipe::base::statistics::median;
 use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::IndexedCatalog;
-use starpipe::model::sensitivity::{Budget, Scenario, SkyBrightness};
-use starpipe::model::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
+use starpipe::lab::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
 use starpipe::pipeline::{Context, Workspace, solve_frame};
+use starpipe::predict::{Budget, Scenario, SkyBrightness};
 use std::f64::consts::{PI, TAU};
 
 /// Approximate threshold of the detector in standard deviations.

@@ -4,7 +4,7 @@ use super::stars::{Field, Star, data_sheet, found_at};
 use super::tally::{Rms, Spread};
 use rayon::prelude::*;
 use starpipe::detect::{CentroidMethod, DetectConfig, Detections, Workspace, detect};
-use starpipe::model::sensitivity::CramerRao;
+use starpipe::predict::CramerRao;
 
 /// Matched-filter signal-to-noise ratios of the stars.
 pub const CLASSES: [(f64, f64); 6] = [

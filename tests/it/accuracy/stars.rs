@@ -7,8 +7,8 @@ use starpipe::base::statistics::normal_cdf;
 use starpipe::camera::data_sheet::{DataSheet, Imperfections, Response};
 use starpipe::detect::{Detection, Detections};
 use starpipe::frame::Frame;
-use starpipe::model::sensitivity::{Budget, Extinction, Scenario, SkyBrightness};
-use starpipe::model::simulate::star_field;
+use starpipe::lab::simulate::star_field;
+use starpipe::predict::{Budget, Extinction, Scenario, SkyBrightness};
 
 /// Distance between stars: they cover a small part of a background cell.
 const SPACING_PX: f64 = 64.0;

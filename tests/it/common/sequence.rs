@@ -6,8 +6,8 @@ use starpipe::camera::data_sheet::{DataSheet, Preset};
 use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::Frame;
-use starpipe::model::sensitivity::Scenario;
-use starpipe::model::simulate::{Pointing, Scene, Simulator};
+use starpipe::lab::simulate::{Pointing, Scene, Simulator};
+use starpipe::predict::Scenario;
 
 /// Time from frame to frame, in seconds.
 pub const INTERVAL_S: f64 = 0.1;

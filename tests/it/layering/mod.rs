@@ -23,8 +23,8 @@ const ROOMS: &[(&str, &[&str])] = &[
         &["base", "catalog", "ephemeris", "frame", "camera", "detect"],
     ),
     (
-        "model",
-        &["base", "catalog", "ephemeris", "frame", "camera", "detect"],
+        "predict",
+        &["base", "catalog", "ephemeris", "camera", "detect"],
     ),
     (
         "photometry",
@@ -36,7 +36,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "camera",
             "detect",
             "identify",
-            "model",
+            "predict",
         ],
     ),
     (
@@ -48,7 +48,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "camera",
             "detect",
             "identify",
-            "model",
+            "predict",
             "photometry",
         ],
     ),
@@ -74,7 +74,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "calibration",
             "detect",
             "identify",
-            "model",
+            "predict",
             "photometry",
             "sky",
             "centroids",
@@ -126,7 +126,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     ("archive", &["base", "catalog", "pipeline", "report"]),
     (
-        "study",
+        "lab",
         &[
             "base",
             "catalog",
@@ -136,7 +136,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "calibration",
             "detect",
             "identify",
-            "model",
+            "predict",
             "photometry",
             "sky",
             "centroids",

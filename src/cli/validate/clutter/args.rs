@@ -4,7 +4,7 @@ use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::OutputFormat;
 use crate::cli::options::setup::SetupOptions;
 use clap::Args;
-use starpipe::study::clutter::ClutterKind;
+use starpipe::lab::clutter::ClutterKind;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

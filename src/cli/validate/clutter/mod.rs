@@ -7,8 +7,8 @@ pub(crate) use args::ClutterArgs;
 
 use crate::cli::exit::{CommandError, CommandOutput};
 use crate::cli::progress::frames_bar_with_speed;
-use starpipe::model::simulate::Setup;
-use starpipe::study::clutter::{ClutterProtocol, KindResult, run};
+use starpipe::lab::clutter::{ClutterProtocol, KindResult, run};
+use starpipe::lab::simulate::Setup;
 
 /// `starpipe validate --suite clutter`
 pub(crate) fn clutter(arguments: &ClutterArgs) -> Result<CommandOutput, CommandError> {

@@ -4,7 +4,7 @@ use crate::cli::exit::CommandError;
 use crate::cli::output::files::write_into;
 use starpipe::frame::{TiffOptions, TiffSamples, write_tiff};
 use starpipe::identify::IndexedCatalog;
-use starpipe::study::clutter::{ClutterKind, ClutterProtocol, FrameMaker};
+use starpipe::lab::clutter::{ClutterKind, ClutterProtocol, FrameMaker};
 use std::io::Cursor;
 use std::path::Path;
 

@@ -7,7 +7,7 @@ use crate::cli::options::values::{self, MAX_SIDE_PX};
 use crate::cli::plot::PlotFile;
 use clap::{Args, ValueEnum};
 use starpipe::identify::Photometry;
-use starpipe::study::robustness::{Mirrored, TrialProtocol};
+use starpipe::lab::robustness::{Mirrored, TrialProtocol};
 
 /// So many centroids a frame has at most.
 const MAX_BRIGHT_FALSE: i64 = 100_000;

@@ -6,7 +6,7 @@ use crate::cli::plot::{
     PlotLayer, Scale, Sheet, chart_on, plot_error,
 };
 use plotters::prelude::*;
-use starpipe::study::robustness::{CaseResult, VariedParameter};
+use starpipe::lab::robustness::{CaseResult, VariedParameter};
 
 const PANELS_ABREAST: usize = 2;
 const TABLE_WIDTH_PX: u32 = 900;

@@ -3,7 +3,7 @@
 use super::args::RobustnessArgs;
 use crate::cli::exit::CommandError;
 use crate::cli::progress::bar;
-use starpipe::study::robustness::{CaseResult, ProtocolCase, VariedParameter, run, standard_cases};
+use starpipe::lab::robustness::{CaseResult, ProtocolCase, VariedParameter, run, standard_cases};
 
 /// A row of the table.
 pub(super) struct SweptRow {

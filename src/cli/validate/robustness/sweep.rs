@@ -3,8 +3,8 @@
 use crate::cli::options::values::{
     field_of_view, multiple, not_negative, not_of_form, part, star_count, whole,
 };
-use starpipe::model::sensitivity::Spacing;
-use starpipe::study::robustness::VariedParameter;
+use starpipe::lab::robustness::VariedParameter;
+use starpipe::predict::Spacing;
 use std::str::FromStr;
 
 /// Largest number of values.

@@ -2,7 +2,7 @@
 
 use super::args::RobustnessArgs;
 use super::rows::SweptRow;
-use starpipe::study::robustness::CaseResult;
+use starpipe::lab::robustness::CaseResult;
 
 /// The table with what its rows have in common.
 pub(super) fn text(arguments: &RobustnessArgs, rows: &[SweptRow]) -> String {
