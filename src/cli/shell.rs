@@ -1,6 +1,6 @@
 //! `completions` and `man`: what shells and manuals say of the command line.
 
-use super::exit::{CommandError, Outcome};
+use super::exit::{CommandError, CommandOutput};
 use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -28,14 +28,17 @@ pub(crate) struct ManArgs {
 pub(crate) fn completions(
     arguments: &CompletionsArgs,
     mut program: Command,
-) -> Result<Outcome, CommandError> {
+) -> Result<CommandOutput, CommandError> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut program, "starpipe", &mut script);
-    Ok(Outcome::success(String::from_utf8(script)?))
+    Ok(CommandOutput::success(String::from_utf8(script)?))
 }
 
 /// `starpipe man`
-pub(crate) fn man(arguments: &ManArgs, mut program: Command) -> Result<Outcome, CommandError> {
+pub(crate) fn man(
+    arguments: &ManArgs,
+    mut program: Command,
+) -> Result<CommandOutput, CommandError> {
     program.build();
     let command = match &arguments.command {
         None => program,
@@ -50,5 +53,5 @@ pub(crate) fn man(arguments: &ManArgs, mut program: Command) -> Result<Outcome, 
         .replace(' ', "-");
     let mut page = Vec::new();
     Man::new(command.name(name)).render(&mut page)?;
-    Ok(Outcome::success(String::from_utf8(page)?))
+    Ok(CommandOutput::success(String::from_utf8(page)?))
 }

@@ -50,6 +50,6 @@ pub use predict::{PredictedStar, SkyView};
 pub use priors::{
     DateSource, DateZone, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
 };
-pub(crate) use search::LOG10_FALSE_ALARM_LIMIT;
+pub use search::LOG10_FALSE_ALARM_LIMIT;
 pub use workspace::{NAME_ODDS, PointedField};
 pub use workspace::{Workspace, identify};

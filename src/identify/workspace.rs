@@ -143,7 +143,7 @@ impl Workspace {
     }
 
     /// Identifies the stars of `field`: [`find_pointing`](Self::find_pointing), then
-    /// [`name_stars`](Pointing::name_stars). The answer is kept in the workspace.
+    /// [`name_stars`](PointedField::name_stars). The answer is kept in the workspace.
     ///
     /// # Errors
     /// The [`SearchFailure`] where they are not identified.
@@ -157,7 +157,7 @@ impl Workspace {
     }
 
     /// Attitude and optics alone, from the brightest stars of `field`:
-    /// [`find_pointing`](Self::find_pointing), then [`attitude`](Pointing::attitude). The answer is kept in the workspace.
+    /// [`find_pointing`](Self::find_pointing), then [`attitude`](PointedField::attitude). The answer is kept in the workspace.
     ///
     /// # Errors
     /// The [`SearchFailure`] where the pointing is not found.

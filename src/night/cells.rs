@@ -3,7 +3,7 @@
 use crate::sky::{Place, SkyCell, SkyMap, horizon_places};
 use serde::{Deserialize, Serialize};
 
-/// The sky in the cells of [`horizon_places`], in their order; `null` where nothing is known.
+/// The sky in the cells of `horizon_places`, in their order; `null` where nothing is known.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NightCells {
     /// Brightness: V magnitude of a square arcsecond.

@@ -29,7 +29,7 @@ use crate::base::statistics::{LnProduct, normal_cdf, normal_cdf_and_density};
 use nalgebra::{Matrix3, Vector3};
 
 /// Centre of the prior of the width, in magnitudes.
-pub(crate) const TYPICAL_WIDTH_MAG: f64 = 0.3;
+pub const TYPICAL_WIDTH_MAG: f64 = 0.3;
 /// Standard deviation of the prior of ln w.
 const LN_WIDTH_SIGMA: f64 = 1.0;
 /// The prior of λ: stars lost and stars kept.
@@ -40,7 +40,7 @@ const MIN_PER_SIDE: usize = 4;
 /// Largest standard error of a limit, in magnitudes.
 const MAX_SIGMA_MAG: f64 = 0.5;
 /// Width of a bin of the curve, in magnitudes.
-pub(crate) const BIN_MAG: f64 = 0.5;
+pub const BIN_MAG: f64 = 0.5;
 
 /// A catalogue star that counts in the completeness.
 #[derive(Debug, Clone, Copy, PartialEq)]

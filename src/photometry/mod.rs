@@ -1,6 +1,6 @@
 //! How bright are the stars in a frame, and how faint does it go? Zero point and completeness.
 //!
-//! ([`IdentifiedFrame`], [`IndexedCatalog`]) → [`FramePhotometry`]
+//! (`IdentifiedFrame`, [`IndexedCatalog`]) → [`FramePhotometry`]
 //!
 //! 1. The catalogue's stars in the frame are predicted, at its date and to well below the faintest
 //!    detection. Those that a detection has the name of are detected.

@@ -14,7 +14,7 @@
 //! 7. Lower bounds of the errors of position and flux ([`CramerRao`]).
 //!
 //! [`Prediction`] is the result for one scenario, [`Sweep`] and [`curves`] vary one parameter, and
-//! [`Figure`] has the figures of the paper.
+//! [`PaperFigure`] has the figures of the paper.
 //!
 //! There are two sets of equations. [`Reading::Paper`] has equations (1) to (12) of the paper as
 //! its authors used them. [`Reading::Physical`] corrects their physics.

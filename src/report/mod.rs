@@ -49,6 +49,6 @@ pub use lens::LensReport;
 pub use sky::{SkyCellReport, SkyReport, ZenithReport};
 pub use star_row::{StarRow, write_table_header};
 pub use stars::detections;
-pub use text::TextOptions;
+pub use text::{STARS_SHOWN, TextOptions};
 pub use track::TrackReport;
 pub use track::{AxesReport, NotTrackedReport, TrackOpticsReport, TrackTimingReport};

@@ -1,6 +1,5 @@
 //! The three forms of a report, compared with their snapshots.
 
-use super::text::STARS_SHOWN;
 use super::*;
 use crate::base::remedy::Remedy;
 use crate::ephemeris::places::AttitudeFrame;

@@ -1,7 +1,7 @@
 //! The sky over an identified frame: how bright it is at each place, how much light the air and clouds
 //! take, and how faint stars go there.
 //!
-//! ([`IdentifiedFrame`], [`Picture`]) → [`SkyMap`]
+//! (`IdentifiedFrame`, `SkyPicture`) → [`SkyMap`]
 //!
 //! 1. The frame is divided into cells (`grid`): rings of altitude where the horizon is known, else
 //!    rectangles of the frame.

@@ -2,7 +2,7 @@
 //!
 //! 1. [`OpenedFile`] decompresses a file and shows its first bytes, which tell its kind.
 //! 2. [`ImportRows`] splits its content into rows, many at once.
-//! 3. A [`Format`] parses each row; [`ImportTally`] collects the stars and counts the other records.
+//! 3. A [`RowParser`] parses each row; [`ImportTally`] collects the stars and counts the other records.
 //! 4. [`combine`](fn@combine) makes the catalogue of all files, without repeated identifiers.
 
 mod combine;

@@ -2,7 +2,7 @@
 //!
 //! Text with a line of headings → stars at J2000.
 //!
-//! 1. [`Table`] takes the first line that is neither empty nor a comment (`#`) as headings, and the
+//! 1. [`CatalogTable`] takes the first line that is neither empty nor a comment (`#`) as headings, and the
 //!    separator (tab, semicolon, bar or comma) from it. It skips lines of units and dashes under
 //!    the headings, and repeated headings.
 //! 2. With SKY2000's labels the columns are SKY2000's; otherwise the general columns are found from

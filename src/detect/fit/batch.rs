@@ -107,7 +107,7 @@ impl BatchFitter {
     }
 
     /// [`Self::fit`] in windows that `cut` fills for each initial guess. Spots may have up to
-    /// [`MAX_BATCH_LOBES`] lobes; their size is then held.
+    /// [`MAX_BATCH_COMPONENTS`] lobes; their size is then held.
     pub fn fit_cut(
         &mut self,
         mut cut: impl FnMut(&BatchStart, &mut Window),

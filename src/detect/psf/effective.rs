@@ -31,7 +31,7 @@ pub(crate) struct FieldComponent {
 pub(crate) struct LocalPsf {
     /// Empty where it is tabulated, and for a single Gaussian of the size that is fitted.
     pub components: Vec<GaussianComponent>,
-    /// The size, as [`Fit::spot_px`](crate::detect::fit::Fit::spot_px), of a spot that is not scaled, in
+    /// The size, as [`SpotFit::spot_px`](crate::detect::fit::SpotFit::spot_px), of a spot that is not scaled, in
     /// pixels.
     pub spot_px: f64,
     /// The spot of that size, where it is tabulated.

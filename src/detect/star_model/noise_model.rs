@@ -196,7 +196,7 @@ impl NoiseSums {
     }
 }
 
-/// The sums of [`Moments`] over the pixels of one star, in units of the noise.
+/// The sums of [`NoiseSums`] over the pixels of one star, in units of the noise.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn sums_of<L: SpotLight>(
     factor: &CholeskyFactor<ONE_SPOT>,

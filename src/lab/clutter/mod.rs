@@ -1,8 +1,8 @@
 //! How often is a name wrong where more than stars is in the picture? And is a picture of something
 //! else ever taken for the sky?
 //!
-//! [`Setup`], catalogue, [`Kind`], seed → for each frame [`ClutteredFrame`] → the pipeline →
-//! [`FrameResult`] → [`KindResult`]
+//! [`Setup`], catalogue, [`ClutterKind`], seed → for each frame [`ClutteredFrame`] → the pipeline →
+//! [`ClutterFrameResult`] → [`KindResult`]
 //!
 //! 1. A sky is simulated at a random attitude, or a picture of no sky is drawn.
 //! 2. Clutter is drawn before the sky or into it, and the frame recorded as cameras do. Stars behind

@@ -1,6 +1,6 @@
 //! How wide should a star's spot be? Centroid error over spot radius and noise.
 //!
-//! [`Grid`], and [`PeakStudy`] or [`EnergyStudy`] → [`ErrorGrid`] → [`Surface`], [`ErrorCurve`]s →
+//! [`SpotNoiseGrid`], and [`PeakStudy`] or [`EnergyStudy`] → [`ErrorGrid`] → [`Surface`], [`ErrorCurve`]s →
 //! [`Optimum`], [`IsoLine`]s
 //!
 //! 1. At every radius and noise of the grid: stars at random positions within a pixel, and the RMS
@@ -9,7 +9,7 @@
 //! 3. At each noise a smooth curve over the radius, its optimum, and the smallest radius that meets
 //!    a given error.
 //! 4. The lines of equal error, and how well a parabola describes each ([`Parabola`]).
-//! 5. The distance from focus at which a lens makes such a spot ([`Lens`]).
+//! 5. The distance from focus at which a lens makes such a spot ([`DefocusLens`]).
 //!
 //! Two questions must be kept apart. [`PeakStudy`] is that of the paper: all spots have the same
 //! *brightest pixel*, so a wider spot has more light, and wide spots win. [`EnergyStudy`] is that

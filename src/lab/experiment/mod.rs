@@ -1,6 +1,6 @@
 //! Can the two experiments of Tong, Li & Wang 2014 be reproduced? Their limits, stars and frames.
 //!
-//! ([`Published`], [`IndexedCatalog`]) → [`Run`] with its [`ExperimentReport`]
+//! ([`Published`], [`IndexedCatalog`]) → [`ExperimentRun`] with its [`ExperimentReport`]
 //!
 //! 1. The limiting magnitude of the sensitivity model in the paper's reading is compared with the
 //!    printed one, and with that of this detector.

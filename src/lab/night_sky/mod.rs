@@ -1,9 +1,9 @@
 //! How accurate is what `starpipe sky` measures? Simulated all-sky frames, compared with the truth in each
 //! cell.
 //!
-//! [`SkyStudy`] → for each number a [`SkyTrial`] ([`FrameRow`], [`CellRow`]s) → [`SkySummary`]
+//! [`SkyStudy`] → for each number a [`SkyTrial`] ([`TrialFrameRow`], [`TrialCellRow`]s) → [`SkySummary`]
 //!
-//! 1. Draw a night and its sky, and how the camera is set ([`Conditions`]); the Moon is where the ephemeris
+//! 1. Draw a night and its sky, and how the camera is set ([`TrialConditions`]); the Moon is where the ephemeris
 //!    has it. The camera looks at the zenith.
 //! 2. Simulate the frame, and measure it as `starpipe sky` does, with or without the camera's description.
 //! 3. Compare each cell with the sky that was drawn (`truth`): its light between the stars, with the halos of

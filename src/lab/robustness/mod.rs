@@ -1,6 +1,6 @@
 //! How often is an identification right, wrong, or not possible? The usual Monte Carlo protocol.
 //!
-//! [`Protocol`] → for each trial a list of centroids drawn from the catalogue → identification as
+//! [`TrialProtocol`] → for each trial a list of centroids drawn from the catalogue → identification as
 //! in `starpipe identify` → [`TrialResult`] → [`TrialResults`] → [`CaseResult`]
 //!
 //! 1. The attitude is uniform over all rotations; the camera is a pinhole.

@@ -1,6 +1,6 @@
 //! How wide should a star's spot be, and how far out of focus does the lens make it?
 //!
-//! [`Plan`] → [`Plan::run`]: a [`StarStudy`] for each star → [`DefocusReport`]
+//! [`DefocusPlan`] → [`DefocusPlan::run`]: a [`StarStudy`] for each star → [`DefocusReport`]
 //!
 //! 1. [`Noise`]: the noise of a pixel without light, from the camera, from dark frames or from the
 //!    paper. The radii are reported for this noise.

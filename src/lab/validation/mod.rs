@@ -1,8 +1,8 @@
 //! How accurate is the whole pipeline? Simulated frames at random attitudes, compared with the
 //! truth and with theory.
 //!
-//! [`Protocol`], [`IndexedCatalog`](crate::identify::IndexedCatalog) → [`Validator`] → for each
-//! number a [`ValidatedFrame`] ([`FrameRecord`], [`StarRecord`]s) → [`Summary`]
+//! [`ValidationProtocol`], [`IndexedCatalog`](crate::identify::IndexedCatalog) → [`Validator`] → for each
+//! number a [`ValidatedFrame`] ([`FrameRecord`], [`StarRecord`]s) → [`ValidationSummary`]
 //!
 //! 1. Draw an attitude uniformly over all rotations, simulate the frame with the stars of the
 //!    catalogue, and process it as `starpipe process` does. Random numbers depend on the seed and

@@ -31,7 +31,7 @@ pub struct ValidationProtocol {
     pub seed: u64,
 }
 
-/// Simulates and processes the frames of a [`Protocol`].
+/// Simulates and processes the frames of a [`ValidationProtocol`].
 pub struct Validator<'a> {
     pub(super) context: Context<'a>,
     pub(super) protocol: ValidationProtocol,

@@ -1,6 +1,6 @@
 //! What should the stated camera have seen in a frame, compared with what it saw?
 //!
-//! ([`ObservingSetup`], [`FrameMeasurement`]) → [`Comparison`]
+//! ([`ObservingSetup`], `FrameMeasurement`) → [`Comparison`]
 //!
 //! 1. The sky brightness comes from the frame itself: its background above the bias, in electrons.
 //! 2. With it, the sensitivity model predicts limiting magnitudes and zero point. The fitted limit

@@ -3,7 +3,7 @@
 //! ([`FrameReport`](super::FrameReport), [`Solution`](crate::pipeline::Solution), [`Shown`](super::overlay::Shown))
 //! → [`html`] → the page of a frame
 //!
-//! [`Page`] → [`Page::to_html`] → a page of anything else, as a command describes it
+//! [`PageContent`] → [`PageContent::to_html`] → a page of anything else, as a command describes it
 //!
 //! Pages need neither network nor other files. Nothing is read or written. All begin alike (`base.html`):
 //!

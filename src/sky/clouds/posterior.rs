@@ -1,6 +1,6 @@
 //! What is believed of the cells of a sky: which are clear, and how thick clouds are.
 //!
-//! ([`Told`] each) → [`Belief`]
+//! ([`CellLikelihoods`] each) → [`CloudPosterior`]
 //!
 //! A part of the sky has the extinction of clear air alone, and the other part more. How large that part is,
 //! and how thick its clouds are on average, is told by all cells together.

@@ -1,6 +1,6 @@
 //! Brightness where gray levels are not proportional to light, or the level without light is not known.
 //!
-//! (stars, frame, [`Levels`]) → [`Curved`]
+//! (stars, frame, [`SkyLevels`]) → [`Curved`]
 //!
 //! 1. By each tone curve that a picture may have (`curve`), the levels of stars and of the sky around them
 //!    become light (`spot`).

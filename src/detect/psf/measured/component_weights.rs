@@ -219,7 +219,7 @@ impl ComponentGrid {
         sums.solve(&expected, near, &self.classes(form))
     }
 
-    /// The lobes that have light, with these [`Self::shares`].
+    /// The lobes that have light, with these [`Self::weights`].
     pub fn components_of(&self, shares: &[f64]) -> Vec<FieldComponent> {
         let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
         self.with_weights(&[&shares[..self.lobes.len()], corner])
@@ -389,7 +389,7 @@ fn add_weighted_component(
 /// than the products.
 type BlockProducts = [[PixelGroup; BLOCK]; BLOCK];
 
-/// [`LobeSums`] lane by lane, while stars are added.
+/// [`ComponentEquations`] lane by lane, while stars are added.
 #[derive(Debug)]
 struct LaneSums {
     /// For each of the parts that two shares have: of blocks i ≤ j, those with j = 0, with 1, …

@@ -1,6 +1,6 @@
 //! The directory of a run: which run it is, and its tables, which a later start continues.
 //!
-//! (directory, [`Protocol`](super::Protocol), [`Catalog`](crate::catalog::Catalog)) →
+//! (directory, [`ValidationProtocol`](super::ValidationProtocol), [`Catalog`](crate::catalog::Catalog)) →
 //! [`claim_directory`] → [`RunTables`]
 //!
 //! 1. `run.json` has all that the tables depend on. A directory with another run is refused.

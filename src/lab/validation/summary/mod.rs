@@ -1,6 +1,6 @@
 //! Statistics over many frames.
 //!
-//! rows of both tables, one at a time → [`Accumulator`] → [`Summary`]
+//! rows of both tables, one at a time → [`Accumulator`] → [`ValidationSummary`]
 //!
 //! Memory does not depend on the number of stars, and is three numbers per frame.
 
