@@ -8,8 +8,8 @@
 //!    ([`dark_level()`]).
 //! 2. Each frame is solved from where the camera is held. Its sky is measured, also where its stars are not
 //!    identified: by the attitude that the mount and the date give ([`NightRow`]).
-//! 3. The pointing that is held follows the frames. A knock is a pointing that differs from it in several
-//!    frames that agree with each other ([`PointingHistory`]).
+//! 3. The fixed pointing follows the frames. A jump is a pointing that differs from it in several frames that
+//!    agree with each other ([`PointingHistory`]).
 //! 4. What stays in its place as the stars move on is a hot pixel ([`hot_pixels()`]).
 //! 5. A frame without stars that is of the day, a dark, or shows trails is passed over ([`NoSky`]).
 //! 6. The series tell when something changes ([`Moment`]).

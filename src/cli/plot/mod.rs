@@ -1,6 +1,6 @@
 //! Figures for people, as SVG or PNG.
 //!
-//! [`Layer`]s of marks over two [`Axis`] → [`Panel`] → [`Sheet`] of panels → [`Figure::render`]
+//! [`PlotLayer`]s of marks over two [`Axis`] → [`Panel`] → [`Sheet`] of panels → [`Figure::render`]
 
 mod axis;
 mod figure;

@@ -33,7 +33,7 @@ impl CloudLight {
     /// The light of `cells`, where a part `clouded` of the sky is not clear by its stars; `before` are the
     /// probabilities without any. `None` if light does not tell of clouds.
     pub(super) fn measure(mut cells: Vec<LitCell>, before: &Hidden, clouded: f64) -> Option<Self> {
-        /// What chance may give of the gain of [`Fit::gains`].
+        /// What chance may give of the gain of [`CloudLightFit::gains`].
         const MIN_GAIN: f64 = 6.0;
         let mut fit = CloudLightFit::of(&mut cells, clouded)?;
         let gains = cells
