@@ -107,8 +107,8 @@ impl Repeats {
         CommonError::fit(&places, left.max(0.25))
     }
 
-    /// The standard errors with which the stars of frames count, where `common` is in common and each alone has
-    /// those of `of_stars`: variances of centroids and of all errors, and residuals.
+    /// The standard errors with which the stars of each frame are weighted in a fit, in pixels. `of_stars` are
+    /// those of each star by itself; what `common` says is repeated by all frames is counted once.
     pub(super) fn sigmas_px(
         &self,
         common: &CommonError,
