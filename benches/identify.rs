@@ -11,7 +11,7 @@ use starpipe::detect::{self, DetectConfig, detect};
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, IndexedCatalog, Priors, ScalePrior, StarField, identify};
-use starpipe::pipeline::{Context, Workspace, solve_frame, star_field};
+use starpipe::solve::{Context, Workspace, solve_frame, star_field};
 use std::f64::consts::SQRT_2;
 use std::hint::black_box;
 use std::path::Path;

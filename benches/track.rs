@@ -10,8 +10,8 @@ use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::Frame;
 use starpipe::identify::IndexedCatalog;
 use starpipe::lab::simulate::{Pointing, Scene, Simulator};
-use starpipe::pipeline::Context;
 use starpipe::predict::Scenario;
+use starpipe::solve::Context;
 use starpipe::track::{Mode, Tracker};
 use std::hint::black_box;
 

@@ -16,7 +16,7 @@
 //!                                                  be seen
 //! ```
 //!
-//! [`pipeline`] runs the stages in this order, [`report`] presents the [`Solution`].
+//! [`solve`] runs the stages in this order, [`report`] presents the [`Solution`].
 //!
 //! # A first program
 //!
@@ -53,7 +53,7 @@
 //! | [`photometry`] | how bright, how faint: zero point, completeness, comparison with the prediction |
 //! | [`sky`] | how bright is the sky, how clear, and how faint do stars go at each place |
 //! | [`centroids`] | what does a list of centroids hold |
-//! | [`pipeline`] | what does a frame show: the stages in order |
+//! | [`solve`] | what does a frame show: the stages in order |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
@@ -88,10 +88,10 @@ pub mod lab;
 #[doc(hidden)]
 pub mod night;
 pub mod photometry;
-pub mod pipeline;
 pub mod predict;
 pub mod report;
 pub mod sky;
+pub mod solve;
 pub mod track;
 
 pub use base::clock::UtcOffset;
@@ -111,11 +111,11 @@ pub use identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, SkyRegion, StarMatch, identify,
 };
 pub use nalgebra;
-pub use pipeline::{
+pub use report::{FrameReport, TextOptions};
+pub use solve::{
     Context, Error, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
     solve_centroids, solve_file, solve_frame,
 };
-pub use report::{FrameReport, TextOptions};
 pub use track::{Track, Tracker};
 
 #[doc = include_str!("../docs/conventions.md")]

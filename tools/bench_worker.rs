@@ -9,7 +9,7 @@ use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Identification, IndexedCatalog, Priors, ScalePrior};
-use starpipe::pipeline::star_field;
+use starpipe::solve::star_field;
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;

@@ -15,7 +15,7 @@ use starpipe::identify::{
     Identification, IndexedCatalog, Priors, ScalePrior, StarField, Workspace,
 };
 use starpipe::lab::robustness::{Answer, SimulatedCentroids, TrialProtocol};
-use starpipe::pipeline::star_field;
+use starpipe::solve::star_field;
 use std::error::Error;
 use std::f64::consts::SQRT_2;
 use std::time::Instant;

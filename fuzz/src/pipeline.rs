@@ -6,8 +6,8 @@ use starpipe::camera::{self, data_sheet::Preset};
 use starpipe::centroids::{CentroidList, CentroidListOptions, ListedCentroid};
 use starpipe::identify::{DateSource, FrameDate, Photometry, Scale, ScaleSource};
 use starpipe::photometry::comparison::ObservingSetup;
-use starpipe::pipeline::{solve_centroids, solve_frame};
 use starpipe::report::overlay::{self, OverlayOptions, Shown};
+use starpipe::solve::{solve_centroids, solve_frame};
 use starpipe::{
     CameraModel, Context, Frame, FrameReport, IndexedCatalog, Interrupt, PixelPoint, ScalePrior,
     Site, Solution, TextOptions, UnitVector, Workspace,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use starpipe::Interrupted;
 use starpipe::base::panics::{Panicked, caught};
 use starpipe::base::remedy::{OptionNames, Remedy};
-use starpipe::pipeline::remedies_of;
+use starpipe::solve::remedies_of;
 use std::error::Error;
 use std::io;
 

@@ -6,7 +6,7 @@ use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use starpipe::calibration::Master;
 use starpipe::frame::{Buffers, Colors, RowOrder};
-use starpipe::pipeline;
+use starpipe::solve;
 use starpipe::{Calibration, Frame};
 use std::path::{Path, PathBuf};
 
@@ -41,7 +41,7 @@ pub struct Masters<'a> {
 /// Why a frame could not be read, or not be solved.
 pub struct Failed(pub PyErr);
 
-impl<E: Into<pipeline::Error>> From<E> for Failed {
+impl<E: Into<solve::Error>> From<E> for Failed {
     fn from(error: E) -> Self {
         Self(exception(error.into()))
     }
@@ -130,6 +130,6 @@ pub fn apply(calibration: &Calibration, frame: &mut Frame, name: &Path) -> Resul
     let applied = calibration.apply(frame);
     Ok(applied.map_err(|source| {
         let path = name.to_owned();
-        pipeline::Error::Calibrate { path, source }
+        solve::Error::Calibrate { path, source }
     })?)
 }

@@ -7,7 +7,7 @@ use starpipe::detect::CentroidMethod;
 use starpipe::ephemeris::observer::Air;
 use starpipe::ephemeris::places::AttitudeFrame;
 use starpipe::identify::Effort;
-use starpipe::pipeline::SolveOptions;
+use starpipe::solve::SolveOptions;
 use starpipe::{ObservationDate, Site, UtcOffset};
 
 /// The options as Python has checked them; `None` stands for the default.

@@ -4,7 +4,7 @@ use crate::errors::exception;
 use crate::interrupt::on_this_thread;
 use pyo3::prelude::*;
 use starpipe::frame::{self, Buffers, FrameError, ImageName};
-use starpipe::pipeline;
+use starpipe::solve;
 use starpipe::{Frame, Interrupt};
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -35,7 +35,7 @@ pub fn buffers(interrupt: &Interrupt) -> Buffers {
 }
 
 fn unread(error: FrameError, name: &str) -> PyErr {
-    exception(pipeline::Error::from(error.in_file(Path::new(name))))
+    exception(solve::Error::from(error.in_file(Path::new(name))))
 }
 
 /// All images of a file: the name of each, and the image or the exception that tells why there is

@@ -14,7 +14,7 @@ use starpipe::centroids::{CentroidList, ListedCentroid};
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
 use starpipe::photometry::instrumental_mag;
-use starpipe::pipeline::{self, solve_centroids, solve_frame, solve_guarded, solve_read};
+use starpipe::solve::{self, solve_centroids, solve_frame, solve_guarded, solve_read};
 use starpipe::{Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -207,9 +207,9 @@ fn solve_input(
     Ok((solution, row_order))
 }
 
-fn detect_error(name: &Path) -> impl FnOnce(DetectError) -> pipeline::Error {
+fn detect_error(name: &Path) -> impl FnOnce(DetectError) -> solve::Error {
     let path = name.to_owned();
-    |source| pipeline::Error::Detect { path, source }
+    |source| solve::Error::Detect { path, source }
 }
 
 /// The library's defaults with what is given.

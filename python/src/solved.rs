@@ -8,9 +8,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use starpipe::frame::{Colors, RowOrder};
 use starpipe::identify::SearchFailure;
-use starpipe::pipeline::{Outcome, Reason};
 use starpipe::report::overlay::{OverlayOptions, Shown};
 use starpipe::report::{page, regions, wcs};
+use starpipe::solve::{Outcome, Reason};
 use starpipe::{Frame, FrameReport, IndexedCatalog, Interrupt, Solution};
 use std::path::Path;
 

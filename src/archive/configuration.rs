@@ -1,7 +1,7 @@
 //! All that the results of a frame depend on beside the frame.
 
 use crate::catalog::Catalog;
-use crate::pipeline::SolveOptions;
+use crate::solve::SolveOptions;
 use serde::Serialize;
 use std::path::Path;
 use std::{fmt, fs, io};

@@ -4,8 +4,8 @@ use crate::base::coords::{Camera, Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
 use crate::base::table::{Column, columns};
 use crate::base::units::DEG_PER_RAD;
-use crate::pipeline::{Outcome, Solution};
 use crate::report::FrameReport;
+use crate::solve::{Outcome, Solution};
 
 /// A frame, as its report has it; `t_min`, `s_fov` and `s_region` are columns of ObsCore.
 ///

@@ -4,8 +4,8 @@
 use crate::centroids::CentroidListError;
 use crate::detect::DetectError;
 use crate::frame::FrameError;
-use crate::pipeline::{Source, Workspace};
 use crate::predict::ScenarioError;
+use crate::solve::{Source, Workspace};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

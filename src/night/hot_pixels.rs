@@ -16,7 +16,7 @@ use crate::base::statistics::{SIGMA_PER_MAD, median, median_of};
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::observer::Site;
 use crate::frame::{Frame, RowOrder};
-use crate::pipeline::FixedCamera;
+use crate::solve::FixedCamera;
 use nalgebra::{Rotation3, Unit, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -8,7 +8,7 @@ use super::almanac::is_by_day;
 use crate::base::epoch::ObservationDate;
 use crate::base::statistics::{SIGMA_PER_MAD, median_of};
 use crate::frame::{Frame, Pixels};
-use crate::pipeline::{Outcome, Solution};
+use crate::solve::{Outcome, Solution};
 use std::path::Path;
 
 /// What a frame shows instead of stars.

@@ -11,8 +11,8 @@ use crate::base::statistics::{Estimate, median_of};
 use crate::base::table::{Column, columns};
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::Identification;
-use crate::pipeline::{Outcome, Solution};
 use crate::sky::{Place, SkyCell, SkyMap};
+use crate::solve::{Outcome, Solution};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 

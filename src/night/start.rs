@@ -6,8 +6,8 @@ use crate::camera::KnownLens;
 use crate::ephemeris::observer::Site;
 use crate::identify::lens::{LensFrame, calibrate};
 use crate::identify::{DateZone, Identification};
-use crate::pipeline::{FixedCamera, Outcome, Solution};
 use crate::sky::{ClearSky, CurveEvidence, DarkLevel, DarkSource};
+use crate::solve::{FixedCamera, Outcome, Solution};
 use jiff::SignedDuration;
 use std::sync::Arc;
 

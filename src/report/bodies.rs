@@ -5,7 +5,7 @@ use super::frame_report::{BodyReport, FrameReport};
 use crate::base::format::{to_decimals, to_significant, turn_deg};
 use crate::base::units::DEG_PER_RAD;
 use crate::identify::{Identification, SourceIndex};
-use crate::pipeline::BodyInFrame;
+use crate::solve::BodyInFrame;
 
 /// Adds `bodies` to `report`, and their names to their detections.
 pub(super) fn add_to(

@@ -27,7 +27,7 @@ use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{DateZone, FrameDate, Identification, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::completeness::MagnitudeBin;
-use crate::pipeline::{
+use crate::solve::{
     Background, Contradiction, Note, Outcome, PlaceTime, Proposal, Solution, Timing,
 };
 use nalgebra::Matrix3;

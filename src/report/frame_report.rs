@@ -42,7 +42,7 @@ pub struct FrameReport {
     pub status: Status,
     /// Why they are not identified, and what may help.
     pub reason: Option<String>,
-    /// Code of the reason, see [`Reason::code`](crate::pipeline::Reason::code).
+    /// Code of the reason, see [`Reason::code`](crate::solve::Reason::code).
     pub reason_code: Option<&'static str>,
     /// Names of the options that may help where they are not identified.
     pub remedies: Vec<Remedy>,
@@ -82,7 +82,7 @@ pub struct FrameReport {
 /// One note, or another statement with a code.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NoteReport {
-    /// Code for programs: of a note that of [`Note::code`](crate::pipeline::Note::code).
+    /// Code for programs: of a note that of [`Note::code`](crate::solve::Note::code).
     pub code: &'static str,
     /// The sentence.
     pub text: String,

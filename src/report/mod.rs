@@ -1,6 +1,6 @@
 //! What is reported of a frame? Plain values with units in their names, as JSON, table or text.
 //!
-//! [`Solution`](crate::pipeline::Solution) → [`FrameReport`] → JSON line, CSV rows or text
+//! [`Solution`](crate::solve::Solution) → [`FrameReport`] → JSON line, CSV rows or text
 //!
 //! [`Track`](crate::track::Track) → [`TrackReport`] → JSON line or text
 //!

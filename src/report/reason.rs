@@ -4,7 +4,7 @@ use crate::base::format::decimals_for;
 use crate::base::units::DEG_PER_RAD;
 use crate::identify::diagnosis::{Diagnosis, Excluded};
 use crate::identify::{LOG10_FALSE_ALARM_LIMIT, ScaleSource, SearchFailure};
-use crate::pipeline::{Reason, Solution};
+use crate::solve::{Reason, Solution};
 
 /// `reason` as text.
 pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
@@ -182,8 +182,8 @@ mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
     use crate::base::units::RAD_PER_DEG;
-    use crate::pipeline::{Outcome, Source};
     use crate::report::sample;
+    use crate::solve::{Outcome, Source};
 
     fn text_of(reason: Reason, detections: usize) -> String {
         let source = Source {

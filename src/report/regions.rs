@@ -44,8 +44,8 @@ mod tests {
     use crate::catalog::Catalog;
     use crate::frame::RowOrder;
     use crate::identify::SearchFailure;
-    use crate::pipeline::{Outcome, Reason};
     use crate::report::sample;
+    use crate::solve::{Outcome, Reason};
 
     #[test]
     fn regions_are_in_the_pixels_of_the_file() {

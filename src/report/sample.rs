@@ -1,7 +1,7 @@
 //! A solution for tests.
 
 use crate::ephemeris::places::AttitudeFrame;
-use crate::pipeline::{Outcome, Solution, Timing};
+use crate::solve::{Outcome, Solution, Timing};
 
 /// A solution with this `outcome` and nothing else.
 pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {

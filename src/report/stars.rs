@@ -10,7 +10,7 @@ use crate::base::units::DEG_PER_RAD;
 use crate::catalog::Catalog;
 use crate::detect::{DetectionFlags, Detections};
 use crate::identify::{Identification, StarMatch};
-use crate::pipeline::Source;
+use crate::solve::Source;
 
 /// The report of a detection that is not identified.
 pub(super) fn detection(source: &Source) -> StarReport {

@@ -9,7 +9,7 @@ use crate::base::remedy::{OptionNames, Remedy};
 use crate::base::units::ARCSEC_PER_RAD;
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::DateSource;
-use crate::pipeline::Note;
+use crate::solve::Note;
 
 /// Number of stars listed without [`TextOptions::all_stars`].
 pub const STARS_SHOWN: usize = 20;

@@ -6,7 +6,7 @@ use super::{build, reason};
 use crate::base::format::{finite, json_escaped, significant, to_decimals};
 use crate::base::units::DEG_PER_RAD;
 use crate::camera::CameraModel;
-use crate::pipeline::Outcome;
+use crate::solve::Outcome;
 use crate::track::{AngularRate, Attitude, Loss, Track};
 use nalgebra::Vector3;
 use serde::Serialize;

@@ -11,7 +11,7 @@ use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::detect::Trail;
 use crate::ephemeris::observer::Observation;
 use crate::photometry::instrumental_mag;
-use crate::pipeline::Solution;
+use crate::solve::Solution;
 
 /// The trails of a frame, where they were searched.
 pub(super) fn reports(solution: &Solution) -> Option<Vec<TrailReport>> {

@@ -12,7 +12,7 @@
 //! 5. `agreement`: the probability that chance gives as good an agreement decides, with the bound
 //!    of identification, [`LOG10_FALSE_ALARM_LIMIT`](crate::identify::LOG10_FALSE_ALARM_LIMIT).
 //!    Where it is missed, the frame is solved in full at once, as
-//!    [`solve_frame`](crate::pipeline::solve_frame) does.
+//!    [`solve_frame`](crate::solve::solve_frame) does.
 //! 6. `lens`: focal length and distortion are refined slowly, from frame to frame.
 //!
 //! The first two frames are solved in full: one attitude has no rate.

@@ -4,7 +4,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::camera::CameraModel;
 use crate::catalog::StarIndex;
 use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
-use crate::pipeline::Solution;
+use crate::solve::Solution;
 use nalgebra::{Matrix3, Vector3};
 
 /// How the attitude of a frame was found.

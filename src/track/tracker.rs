@@ -18,7 +18,7 @@ use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, MIN_STARS, Scale, ScalePrior, ScaleSource,
 };
 use crate::photometry::instrumental_mag;
-use crate::pipeline::{Context, Outcome, Solution, Workspace, solve_frame};
+use crate::solve::{Context, Outcome, Solution, Workspace, solve_frame};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// Default number of stars that are tracked.

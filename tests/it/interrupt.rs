@@ -3,7 +3,7 @@
 use crate::common::fixture;
 use starpipe::frame::{Buffers, FrameError};
 use starpipe::identify::IndexedCatalog;
-use starpipe::pipeline::{Outcome, Workspace, solve_frame};
+use starpipe::solve::{Outcome, Workspace, solve_frame};
 use starpipe::{Context, Frame, Interrupt, frame};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -16,7 +16,7 @@ fn process(arguments: &[&Path]) -> Ran {
 
 #[test]
 fn the_documents_state_the_time_limit_of_the_program() {
-    let limit_s = starpipe::pipeline::DEFAULT_TIME_LIMIT_S;
+    let limit_s = starpipe::solve::DEFAULT_TIME_LIMIT_S;
     for (name, stated) in [
         ("SECURITY.md", format!("`--time-limit` ({limit_s} s,")),
         ("docs/process.md", format!("in seconds (default {limit_s})")),

@@ -8,7 +8,7 @@ use starpipe::camera::Projection;
 use starpipe::centroids::ListedCentroid;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::{DateSource, DateZone, FrameDate, Photometry};
-use starpipe::pipeline::{Change, Contradiction, Note, PlaceTime};
+use starpipe::solve::{Change, Contradiction, Note, PlaceTime};
 use starpipe::{
     CameraModel, CentroidList, Context, ObservationDate, PixelPoint, Rotation, Site, Solution,
     UnitVector, UtcOffset, Workspace, solve_centroids,

@@ -130,7 +130,7 @@ fn every_code_of_a_note_is_documented() {
     let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/json.md"));
     let page = page.unwrap();
     let sources = [
-        include_str!("../../src/pipeline/note.rs"),
+        include_str!("../../src/solve/note.rs"),
         include_str!("../../src/photometry/comparison/contradiction.rs"),
     ];
     let codes: Vec<&str> = sources

@@ -4,9 +4,9 @@ use crate::equipment::Equipment;
 use crate::{catalogs, options, progress, told};
 use serde::Deserialize;
 use starpipe::frame::{self, Buffers, Colors, Pages};
-use starpipe::pipeline::{self, Stage};
 use starpipe::report::overlay::{self, OverlayFormat, OverlayOptions, Rings, Shown, SkyLayers};
 use starpipe::report::{page, wcs};
+use starpipe::solve::{self, Stage};
 use starpipe::{Catalog, Context, Frame, FrameReport, IndexedCatalog, Solution, Workspace};
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -80,7 +80,7 @@ impl Solver {
             let decoded = frame::decode_page_with(&bytes, image, buffers);
             decoded.map_err(|error| error.in_file(path))
         };
-        let solved = pipeline::solve_read(path, read, &context, &mut self.workspace);
+        let solved = solve::solve_read(path, read, &context, &mut self.workspace);
         let (solution, frame) = solved.map_err(told)?;
         let catalog = self.indexed.catalog();
         let report = FrameReport::new(name, &solution, catalog);

@@ -9,7 +9,7 @@ use crate::cli::progress::frames_bar;
 use anyhow::Context;
 use starpipe::calibration::Master;
 use starpipe::frame::{self, Buffers, Cameras, Folder, Frame, FrameError, PassedOver};
-use starpipe::pipeline;
+use starpipe::solve;
 use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct FrameList {
     pub(crate) paths: Vec<PathBuf>,
     /// One for each directory that could not be read or has no frames.
-    pub(crate) errors: Vec<pipeline::Error>,
+    pub(crate) errors: Vec<solve::Error>,
     /// What is no frame of the sky in the directories.
     pub(crate) passed_over: Vec<PassedOver>,
 }

@@ -11,7 +11,7 @@ use crate::cli::options::values;
 use crate::cli::solving::SolvingPlan;
 use clap::Args;
 use starpipe::calibration::Calibration;
-use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
+use starpipe::solve::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

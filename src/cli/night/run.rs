@@ -10,7 +10,7 @@ use starpipe::UtcOffset;
 use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::night::{NightRow, NightStart, NoSky, PointingHistory, Probe, probe_order};
-use starpipe::pipeline::{Context, FixedCamera};
+use starpipe::solve::{Context, FixedCamera};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use starpipe::archive::{Configuration, FileHash};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::catalog::Catalog;
-use starpipe::pipeline::SolveOptions;
+use starpipe::solve::SolveOptions;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Clone, Args)]

@@ -11,7 +11,7 @@ use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::camera::formats::{from_opencv_yaml_within, from_platepar_within};
 use starpipe::camera::{CameraModel, KnownLens};
 use starpipe::ephemeris::places::AttitudeFrame;
-use starpipe::pipeline::SolveOptions;
+use starpipe::solve::SolveOptions;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 use starpipe::base::format::printable;
 use starpipe::base::remedy::OptionNames;
-use starpipe::pipeline::remedies_of;
+use starpipe::solve::remedies_of;
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::PathBuf;

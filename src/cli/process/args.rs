@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum, value_parser};
 use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
 use starpipe::detect::CentroidMethod;
 use starpipe::frame::PageChoice;
-use starpipe::pipeline::SolveOptions;
+use starpipe::solve::SolveOptions;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 

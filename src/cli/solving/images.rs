@@ -6,7 +6,7 @@ use crate::cli::input::stdin::is_stdin;
 use anyhow::Context as _;
 use starpipe::centroids::CentroidListOptions;
 use starpipe::frame::{Buffers, Frame, FrameError, ImageName, PageChoice, Pages};
-use starpipe::pipeline::{
+use starpipe::solve::{
     Context, Error, Solution, Workspace, solve_centroids, solve_guarded, solve_read,
 };
 use std::path::Path;

@@ -7,8 +7,8 @@ use crate::cli::options::hints::HintOptions;
 use crate::cli::options::values;
 use clap::{Args, ValueEnum};
 use starpipe::identify::{Effort, NAME_ODDS};
-use starpipe::pipeline::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use starpipe::report::tables::TableFormat;
+use starpipe::solve::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]

@@ -16,8 +16,8 @@ use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::catalog::Catalog;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
-use starpipe::pipeline::{Context, SolveOptions};
 use starpipe::report::FrameReport;
+use starpipe::solve::{Context, SolveOptions};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 

@@ -3,7 +3,7 @@
 use super::images::{Images, Inputs, SolvedImage};
 use crate::cli::batch::for_each_ordered;
 use starpipe::frame::{ImageName, MemoryLimit};
-use starpipe::pipeline::{Context, Workspace, solve_guarded};
+use starpipe::solve::{Context, Workspace, solve_guarded};
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -14,7 +14,7 @@ use starpipe::lab::validation::store::{
     FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
 };
 use starpipe::lab::validation::{ValidationProtocol, ValidationSummary, Validator};
-use starpipe::pipeline::Workspace;
+use starpipe::solve::Workspace;
 use std::path::Path;
 use std::time::Instant;
 

@@ -10,7 +10,7 @@ use starpipe::ephemeris::observer::Site;
 use starpipe::lab::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
 use starpipe::lab::validation::ValidationProtocol;
 use starpipe::lab::validation::store::claim_directory;
-use starpipe::pipeline::Workspace;
+use starpipe::solve::Workspace;
 use std::path::Path;
 
 /// Where the frames are taken.

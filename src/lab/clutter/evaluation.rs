@@ -7,7 +7,7 @@ use crate::lab::robustness::Answer;
 use crate::lab::simulate::{TrueStar, Truth};
 use crate::lab::trials::is_star_like;
 use crate::lab::validation::LightMap;
-use crate::pipeline::{Solution, Source};
+use crate::solve::{Solution, Source};
 
 /// The result of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

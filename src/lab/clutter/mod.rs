@@ -37,7 +37,7 @@ use crate::detect::DetectConfig;
 use crate::identify::IndexedCatalog;
 use crate::lab::simulate::Setup;
 use crate::lab::{StudyError, trials};
-use crate::pipeline::{Context, Workspace, solve_frame};
+use crate::solve::{Context, Workspace, solve_frame};
 
 /// What all kinds of frames of a study have in common.
 #[derive(Debug, Clone, PartialEq)]

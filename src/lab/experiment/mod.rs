@@ -35,8 +35,8 @@ use crate::frame::Frame;
 use crate::identify::{DateSource, FrameDate, IndexedCatalog, Priors};
 use crate::lab::StudyError;
 use crate::lab::simulate::{Pointing, Scene, Simulator};
-use crate::pipeline::{Context, Solution, Workspace, solve_centroids};
 use crate::predict::{Budget, Detector, Rule, Scenario};
+use crate::solve::{Context, Solution, Workspace, solve_centroids};
 use simulated::Simulation;
 
 /// Number of simulated frames, and their seed.

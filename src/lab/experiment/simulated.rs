@@ -9,8 +9,8 @@ use crate::lab::StudyError;
 use crate::lab::simulate::{Pointing, Simulator, Truth};
 use crate::lab::trials::{self, is_star_like, random_of};
 use crate::lab::validation::LightMap;
-use crate::pipeline::{Context, Solution, Workspace, solve_frame};
 use crate::predict::{Detector, Faintest, Scenario};
+use crate::solve::{Context, Solution, Workspace, solve_frame};
 use nalgebra::Vector3;
 use rand::Rng;
 

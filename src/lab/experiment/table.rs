@@ -8,8 +8,8 @@ use crate::catalog::{Catalog, StarId, StarIndex};
 use crate::centroids::{CentroidList, ListedCentroid};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{Identification, Photometry, SourceIndex};
-use crate::pipeline::Solution;
 use crate::predict::{Budget, Scenario};
+use crate::solve::Solution;
 use serde::Serialize;
 
 /// The result of the paper's table.

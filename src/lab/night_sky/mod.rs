@@ -29,7 +29,7 @@ use crate::lab::StudyError;
 use crate::lab::simulate::{Setup, Simulator};
 use crate::lab::trials::random_of;
 use crate::photometry::comparison::ObservingSetup;
-use crate::pipeline::{Context, Workspace, solve_frame};
+use crate::solve::{Context, Workspace, solve_frame};
 use truth::TrueNightSky;
 
 /// Simulates and measures skies over one camera.

@@ -4,8 +4,8 @@ use super::conditions::TrialConditions;
 use super::truth::{TrueCell, TrueNightSky};
 use crate::base::format::to_decimals;
 use crate::lab::robustness::Answer;
-use crate::pipeline::Solution;
 use crate::sky::{Place, SkyCell, SkyMap};
+use crate::solve::Solution;
 use serde::{Deserialize, Serialize};
 
 /// Decimals of magnitudes, shares and angles.

@@ -37,7 +37,7 @@ pub use trial::{TrialResult, TrialResults};
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::{IndexedCatalog, identify};
 use crate::lab::trials::{self, random_of};
-use crate::pipeline::Workspace;
+use crate::solve::Workspace;
 use std::time::Instant;
 
 /// Runs `trials` trials of `protocol` on the threads of the current pool; `done` is called after

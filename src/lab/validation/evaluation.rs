@@ -13,8 +13,8 @@ use crate::lab::simulate::TrueStar;
 use crate::lab::trials::is_star_like;
 use crate::photometry::comparison::{expected_zero_point_vmag, fitted_color_effect_mag};
 use crate::photometry::{SUN_BV_MAG, filter_response};
-use crate::pipeline::{Note, Outcome, Solution};
 use crate::predict::{CramerRao, Faintest};
+use crate::solve::{Note, Outcome, Solution};
 use std::collections::{HashMap, HashSet};
 
 pub(super) struct Evaluation<'a> {

@@ -46,7 +46,7 @@ pub use summary::{
 pub use validator::{ValidationProtocol, Validator, draw};
 
 use crate::lab::StudyError;
-use crate::pipeline::{Workspace, solve_frame};
+use crate::solve::{Workspace, solve_frame};
 use evaluation::Evaluation;
 use std::time::Instant;
 

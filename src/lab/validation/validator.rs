@@ -14,8 +14,8 @@ use crate::lab::robustness::random_rotation;
 use crate::lab::simulate::{Pointing, Setup, Simulator, Truth};
 use crate::lab::trials::random_of;
 use crate::photometry::comparison::ObservingSetup;
-use crate::pipeline::Context;
 use crate::predict::{Budget, Detector, Rule};
+use crate::solve::Context;
 use rand::Rng;
 
 /// What is simulated, and what the pipeline knows about it.

@@ -10,7 +10,7 @@ use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::CameraModel;
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::Identification;
-use crate::pipeline::Solution;
+use crate::solve::Solution;
 
 // Lengths are in units of strokes.
 

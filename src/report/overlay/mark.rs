@@ -6,7 +6,7 @@ use super::options::LabelKind;
 use super::picture::Picture;
 use crate::catalog::Catalog;
 use crate::ephemeris::solar_system::BodyKind;
-use crate::pipeline::{BodyInFrame, Solution, Source};
+use crate::solve::{BodyInFrame, Solution, Source};
 
 /// Smallest and largest radius of a ring, in units of strokes.
 const RADIUS: (f32, f32) = (5.0, 15.0);

@@ -40,7 +40,7 @@ pub use svg::is_overlay as is_svg;
 use crate::catalog::Catalog;
 #[cfg(feature = "page")]
 use crate::frame::Frame;
-use crate::pipeline::{Background, Solution};
+use crate::solve::{Background, Solution};
 use canvas::Canvas;
 use image::RgbImage;
 use mark::MarkKind;

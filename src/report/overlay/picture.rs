@@ -6,7 +6,7 @@ use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
 use crate::detect::BackgroundMap;
 use crate::frame::{Colors, Frame, luminance};
-use crate::pipeline::Background;
+use crate::solve::Background;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 

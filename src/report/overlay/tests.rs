@@ -10,8 +10,8 @@ use crate::detect::DetectionFlags;
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
-use crate::pipeline::{Background, Measured, Outcome, Reason, Source};
 use crate::report::sample;
+use crate::solve::{Background, Measured, Outcome, Reason, Source};
 use nalgebra::Matrix3;
 
 const WIDTH: usize = 900;

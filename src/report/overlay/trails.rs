@@ -2,7 +2,7 @@
 
 use super::canvas::{Canvas, Rgb};
 use super::picture::Picture;
-use crate::pipeline::Solution;
+use crate::solve::Solution;
 
 const COLOR: Rgb = Rgb([140, 235, 150]);
 /// Distance of a line from the edge of the light, and its width, in strokes.

@@ -3,10 +3,10 @@
 use crate::base::format::to_decimals;
 use crate::base::size::Size;
 use crate::identify::StarMatch;
-use crate::pipeline::{Solution, Source};
 use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
 use crate::report::overlay::{SkyLayer, sky_layers};
+use crate::solve::{Solution, Source};
 use serde::Serialize;
 
 /// The numbers of a page.

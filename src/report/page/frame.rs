@@ -6,9 +6,9 @@
 use super::data::PageData;
 use super::template::{PageKind, picture_address, render, render_view, shown_data};
 use crate::frame::Frame;
-use crate::pipeline::Solution;
 use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
 use crate::report::{FrameReport, TextOptions};
+use crate::solve::Solution;
 use minijinja::context;
 use minijinja::value::{Serde, Value};
 use std::io;
@@ -105,9 +105,9 @@ mod tests {
     use crate::base::format::is_deceptive;
     use crate::catalog::Catalog;
     use crate::identify::SearchFailure;
-    use crate::pipeline::{Outcome, Reason};
     use crate::report::page::is_page;
     use crate::report::{frame_report::StarReport, sample};
+    use crate::solve::{Outcome, Reason};
 
     /// A frame with one detection that is not identified.
     fn frame() -> (Solution, FrameReport) {

@@ -1,6 +1,6 @@
 //! What was found, and how sure is that? A page to look at, in one file.
 //!
-//! ([`FrameReport`](super::FrameReport), [`Solution`](crate::pipeline::Solution), [`Shown`](super::overlay::Shown))
+//! ([`FrameReport`](super::FrameReport), [`Solution`](crate::solve::Solution), [`Shown`](super::overlay::Shown))
 //! → [`html`] → the page of a frame
 //!
 //! [`PageContent`] → [`PageContent::to_html`] → a page of anything else, as a command describes it

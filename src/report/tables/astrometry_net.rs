@@ -7,8 +7,8 @@
 
 use super::fits_table;
 use crate::base::table::{Column, columns};
-use crate::pipeline::Solution;
 use crate::report::{FrameReport, StarReport};
+use crate::solve::Solution;
 
 /// A detection and its star. Names are those of astrometry.net.
 #[derive(Debug, Default)]

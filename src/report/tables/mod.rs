@@ -12,7 +12,7 @@ mod fits_table;
 pub mod votable;
 
 use super::{FrameReport, StarRow};
-use crate::pipeline::Solution;
+use crate::solve::Solution;
 
 /// The kind of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

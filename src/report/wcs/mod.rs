@@ -24,7 +24,7 @@ use crate::frame::{
     COPY_CREATOR, FitsHeader, FitsSamples, FitsWriteError, Frame, RowOrder, write_rows,
 };
 use crate::identify::{Identification, SkyView};
-use crate::pipeline::{Outcome, Solution};
+use crate::solve::{Outcome, Solution};
 use memchr::memmem;
 use nalgebra::{Matrix2, RowVector2, Vector3};
 use plane::Plane;

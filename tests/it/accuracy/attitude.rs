@@ -13,8 +13,8 @@ use starpipe::catalog::Catalog;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::identify::IndexedCatalog;
 use starpipe::lab::simulate::{Pointing, Scene, Simulator, TrueStar, Truth};
-use starpipe::pipeline::{Context, Workspace, solve_frame};
 use starpipe::predict::{Budget, Scenario, SkyBrightness};
+use starpipe::solve::{Context, Workspace, solve_frame};
 use std::f64::consts::{PI, TAU};
 
 /// Approximate threshold of the detector in standard deviations.

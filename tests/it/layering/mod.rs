@@ -64,7 +64,7 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "pipeline",
+        "solve",
         &[
             "base",
             "catalog",
@@ -91,7 +91,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "detect",
             "identify",
             "photometry",
-            "pipeline",
+            "solve",
         ],
     ),
     (
@@ -107,7 +107,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "identify",
             "photometry",
             "sky",
-            "pipeline",
+            "solve",
             "track",
         ],
     ),
@@ -120,11 +120,11 @@ const ROOMS: &[(&str, &[&str])] = &[
             "camera",
             "identify",
             "sky",
-            "pipeline",
+            "solve",
             "report",
         ],
     ),
-    ("archive", &["base", "catalog", "pipeline", "report"]),
+    ("archive", &["base", "catalog", "solve", "report"]),
     (
         "lab",
         &[
@@ -140,7 +140,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "photometry",
             "sky",
             "centroids",
-            "pipeline",
+            "solve",
             "night",
         ],
     ),

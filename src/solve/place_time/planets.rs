@@ -9,8 +9,8 @@ use crate::base::coords::{PixelPoint, UnitVector};
 use crate::base::statistics::median_of;
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::solar_system::{Body, BodyKind, TimeError, bodies_at};
-use crate::pipeline::bodies::mag;
-use crate::pipeline::body_in_frame::BodyInFrame;
+use crate::solve::bodies::mag;
+use crate::solve::body_in_frame::BodyInFrame;
 use std::collections::HashSet;
 
 /// Planets to this V magnitude are missed where they are missing.

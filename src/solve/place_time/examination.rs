@@ -7,7 +7,7 @@ use super::sun;
 use crate::base::epoch::ObservationDate;
 use crate::ephemeris::observer::Site;
 use crate::ephemeris::places::StarPlaces;
-use crate::pipeline::source::Source;
+use crate::solve::source::Source;
 
 /// What a frame shows, ready to be held against places and times.
 pub(super) struct Examination<'a> {
