@@ -32,7 +32,7 @@ thread_local! {
 /// Whether panics are silent on all threads.
 static IS_SILENT: AtomicBool = AtomicBool::new(false);
 
-/// The latest panic of any thread: only the hook is told the place, only [`caught`] who asked.
+/// The latest panic of any thread: only the hook is message the place, only [`caught`] who asked.
 static LATEST: Mutex<Option<Panicked>> = Mutex::new(None);
 
 /// Calls `work` and makes an error of a panic, whose message is not printed. What `work` was changing
@@ -119,17 +119,17 @@ mod tests {
         assert_eq!(found.message, "bad item 3");
         let place = found.place.as_ref().unwrap();
         assert!(place.contains("panics.rs:"), "{place}");
-        let told = found.to_string();
+        let message = found.to_string();
         assert!(
-            told.contains("bad item 3 (") && told.contains(place),
-            "{told}"
+            message.contains("bad item 3 (") && message.contains(place),
+            "{message}"
         );
         assert!(!IS_CAUGHT.get());
     }
 
     #[test]
     fn a_place_does_not_tell_where_the_package_was_compiled() {
-        for (place, told) in [
+        for (place, message) in [
             ("src/detect/mod.rs:1:2", "src/detect/mod.rs:1:2"),
             (
                 "/home/me/tiff-0.11.3/src/a/b.rs:1:2",
@@ -140,7 +140,7 @@ mod tests {
                 "core/src/slice.rs:1:2",
             ),
         ] {
-            assert_eq!(in_package(place), told);
+            assert_eq!(in_package(place), message);
         }
     }
 

@@ -45,8 +45,8 @@ impl Colors {
 
     /// [`Self::read`] for the content of a file.
     pub fn decode(bytes: &[u8], frame: &Frame, buffers: &mut Buffers) -> Option<Self> {
-        let account = buffers.budget(bytes.len()).ok()?;
-        let (size, pixels) = no_panic(|| decode(bytes, &account)).ok()??;
+        let budget = buffers.budget(bytes.len()).ok()?;
+        let (size, pixels) = no_panic(|| decode(bytes, &budget)).ok()??;
         if size != frame.stored_size() {
             return None;
         }
@@ -59,29 +59,29 @@ impl Colors {
 /// The colors in the rows of a file.
 type Decoded = Option<(Size, Vec<[u16; 3]>)>;
 
-fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
+fn decode(bytes: &[u8], budget: &ReadBudget) -> Result<Decoded, FrameError> {
     Ok(match FrameFormat::detect(bytes) {
         Some(FrameFormat::Png | FrameFormat::Jpeg | FrameFormat::Bmp | FrameFormat::Pnm) => {
-            of_picture(bytes, account)?
+            of_picture(bytes, budget)?
         }
-        Some(FrameFormat::Tiff) => of_tiff(bytes, account)?,
+        Some(FrameFormat::Tiff) => of_tiff(bytes, budget)?,
         _ => None,
     })
 }
 
 /// Refuses a picture that cannot be held twice, as it is decoded and as it is kept.
-fn check(size: Size, account: &ReadBudget) -> Result<(), FrameError> {
+fn check(size: Size, budget: &ReadBudget) -> Result<(), FrameError> {
     check_size(size.width, size.height)?;
-    account.check_image(size, 2 * size_of::<[u16; 3]>())
+    budget.check_image(size, 2 * size_of::<[u16; 3]>())
 }
 
-fn of_picture(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
+fn of_picture(bytes: &[u8], budget: &ReadBudget) -> Result<Decoded, FrameError> {
     let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let Some((width, height)) = reader().ok().and_then(|r| r.into_dimensions().ok()) else {
         return Ok(None);
     };
     let size = Size::new(width as usize, height as usize);
-    check(size, account)?;
+    check(size, budget)?;
     let Some(picture) = reader().ok().and_then(|r| r.decode().ok()) else {
         return Ok(None);
     };
@@ -95,7 +95,7 @@ fn of_picture(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError>
     Ok(Some((size, pixels)))
 }
 
-fn of_tiff(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
+fn of_tiff(bytes: &[u8], budget: &ReadBudget) -> Result<Decoded, FrameError> {
     let Ok(mut decoder) = Decoder::new(Cursor::new(bytes)) else {
         return Ok(None);
     };
@@ -105,7 +105,7 @@ fn of_tiff(bytes: &[u8], account: &ReadBudget) -> Result<Decoded, FrameError> {
         return Ok(None);
     };
     let size = Size::new(width as usize, height as usize);
-    check(size, account)?;
+    check(size, budget)?;
     let pixels = match decoder.read_image() {
         Ok(DecodingResult::U8(levels)) => wide(&levels),
         Ok(DecodingResult::U16(levels)) => levels.as_chunks().0.to_vec(),

@@ -9,7 +9,7 @@ use flate2::read::MultiGzDecoder;
 use std::io::{self, ErrorKind, Read};
 
 /// Decompresses the image file in `bytes`, which is of a compressed `format`. The content is booked on
-/// `account`.
+/// `budget`.
 /// # Errors
 /// [`FrameError::UnknownFormat`] if the content does not begin like an image, before much of it is
 /// decompressed; [`FrameError::Truncated`], [`FrameError::Malformed`], [`FrameError::OutOfMemory`],
@@ -17,7 +17,7 @@ use std::io::{self, ErrorKind, Read};
 pub(super) fn unpack(
     bytes: &[u8],
     format: FrameFormat,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<u8>, FrameError> {
     let (known, inside) = format_inside(bytes, format);
     if known.is_none() && !inside.is_empty() {
@@ -25,10 +25,10 @@ pub(super) fn unpack(
         return Err(FrameError::UnknownFormat { found });
     }
     let mut unpacked = Vec::new();
-    let mut reader = account
+    let mut reader = budget
         .timed(decoder(bytes, format))
         .take(MAX_FILE_BYTES + 1);
-    let appended = account.append(&mut reader, &mut unpacked);
+    let appended = budget.append(&mut reader, &mut unpacked);
     appended.map_err(|error| match error {
         FrameError::Io(error) => damaged(&error, format, bytes.len()),
         other => other,

@@ -24,8 +24,8 @@ const BLOCK_PX: usize = 32;
 /// Decodes a baseline or progressive JPEG.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
-    let jpeg = Jpeg::open(bytes, account)?;
+pub(super) fn decode(bytes: &[u8], budget: &ReadBudget) -> Result<Frame<'static>, FrameError> {
+    let jpeg = Jpeg::open(bytes, budget)?;
     // The decoder fills missing data and reports no error.
     if !has_end(bytes) {
         return Err(FrameError::Truncated {
@@ -42,15 +42,15 @@ pub(super) fn decode(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static
         _ => bytes_per_pixel.max(FLOATS_BYTES_PER_PIXEL),
     };
     let padded = |side: usize| side.next_multiple_of(BLOCK_PX);
-    account.check_image(Size::new(padded(width), padded(height)), bytes_per_pixel)?;
-    let values = jpeg.samples(account)?;
+    budget.check_image(Size::new(padded(width), padded(height)), bytes_per_pixel)?;
+    let values = jpeg.samples(budget)?;
     let samples = LevelSamples {
         width,
         height,
         values: &values,
         channels: jpeg.channels,
     };
-    let frame = frame_from_integers(&samples, u8::MAX, account)?;
+    let frame = frame_from_integers(&samples, u8::MAX, budget)?;
     drop(values);
     let metadata = jpeg.exif.map(|exif| exif::metadata(&exif, width));
     Ok(frame.with_metadata(metadata.unwrap_or_default()).drawn())
@@ -69,11 +69,11 @@ pub(super) struct Jpeg<'a> {
 
 impl<'a> Jpeg<'a> {
     /// Reads the header of the file `bytes`.
-    pub fn open(bytes: &'a [u8], account: &ReadBudget) -> Result<Self, FrameError> {
-        let source = account.timed(ZCursor::new(bytes));
+    pub fn open(bytes: &'a [u8], budget: &ReadBudget) -> Result<Self, FrameError> {
+        let source = budget.timed(ZCursor::new(bytes));
         let mut decoder = JpegDecoder::new_with_options(source, options());
         let opened = decoder.decode_headers();
-        opened.map_err(|error| account.why(error_of(error, bytes.len())))?;
+        opened.map_err(|error| budget.why(error_of(error, bytes.len())))?;
         let (width, height) = decoder.dimensions().unwrap_or_default();
         Ok(Self {
             bytes,
@@ -100,20 +100,20 @@ impl<'a> Jpeg<'a> {
     }
 
     /// The samples, interleaved. Every row of them is in the file.
-    pub fn samples(&self, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
+    pub fn samples(&self, budget: &ReadBudget) -> Result<Vec<u8>, FrameError> {
         self.scans.check(Size::new(self.width, self.height))?;
-        check_rows(self.bytes, account)?;
+        check_rows(self.bytes, budget)?;
         let color = match self.channels {
             1 => ColorSpace::Luma,
             _ => ColorSpace::RGB,
         };
-        let source = account.timed(ZCursor::new(self.bytes));
+        let source = budget.timed(ZCursor::new(self.bytes));
         let options = options().jpeg_set_out_colorspace(color);
         let mut values = vec![0; self.width * self.height * self.channels];
         let decoded = JpegDecoder::new_with_options(source, options).decode_into(&mut values);
-        decoded.map_err(|error| account.why(error_of(error, self.bytes.len())))?;
+        decoded.map_err(|error| budget.why(error_of(error, self.bytes.len())))?;
         // Ended in the middle, the decoder is content with what it has.
-        account.check_time()?;
+        budget.check_time()?;
         Ok(values)
     }
 }

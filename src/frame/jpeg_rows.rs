@@ -23,15 +23,15 @@ const MAX_CODE_BITS: u32 = 16;
 /// Refuses an image whose data end, or cannot be decoded any further, before its last row.
 /// # Errors
 /// [`FrameError::Truncated`], [`FrameError::Interrupted`].
-pub(super) fn check_rows(bytes: &[u8], account: &ReadBudget) -> Result<(), FrameError> {
+pub(super) fn check_rows(bytes: &[u8], budget: &ReadBudget) -> Result<(), FrameError> {
     let walk = Walk {
-        budget: Some(account),
+        budget: Some(budget),
         ..Walk::default()
     };
     let Some(missing) = walk.missing_rows(bytes) else {
         return Ok(());
     };
-    Err(account.why(FrameError::Truncated {
+    Err(budget.why(FrameError::Truncated {
         format: FrameFormat::Jpeg,
         found_bytes: bytes.len(),
         detail: format!(

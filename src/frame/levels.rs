@@ -109,7 +109,7 @@ impl<'p> Frame<'p> {
 pub(super) fn frame_from_integers<T: WholeNumber>(
     samples: &LevelSamples<'_, T>,
     full_scale: T,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let (width, height) = (samples.width, samples.height);
     check_size(width, height)?;
@@ -129,7 +129,7 @@ pub(super) fn frame_from_integers<T: WholeNumber>(
         channels => {
             let colors = values.chunks_exact(channels);
             let luminance = |c: &[T]| luminance([level(c[0]), level(c[1]), level(c[2])], full);
-            Pixels::F32(match account.color_channel() {
+            Pixels::F32(match budget.color_channel() {
                 None => colors.map(luminance).collect(),
                 Some(channel) => colors.map(|c| level(c[channel])).collect(),
             })
@@ -200,13 +200,13 @@ pub(super) fn frame_from_floats(
     size: Size,
     channels: usize,
     values: Vec<f32>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let samples = values.chunks_exact(channels);
     let pixels = match channels {
         1 => values,
         2 => samples.map(|c| c[0]).collect(),
-        _ => match account.color_channel() {
+        _ => match budget.color_channel() {
             None => samples
                 .map(|c| luminance([c[0], c[1], c[2]], f32::INFINITY))
                 .collect(),

@@ -44,39 +44,39 @@ impl Pages {
     /// # Errors
     /// As [`Self::open`], without the path.
     pub fn read(stream: impl Read, buffers: &mut Buffers) -> Result<Self, FrameError> {
-        let account = buffers.budget(0)?;
+        let budget = buffers.budget(0)?;
         let mut bytes = Vec::new();
-        read_limited(stream, 0, &account, &mut bytes)?;
-        Self::unpacked(bytes, &account)
+        read_limited(stream, 0, &budget, &mut bytes)?;
+        Self::unpacked(bytes, &budget)
     }
 
     /// The images of the file whose content is `bytes`.
     /// # Errors
     /// As [`Self::open`], without the path.
     pub fn from_bytes(bytes: Vec<u8>, buffers: &mut Buffers) -> Result<Self, FrameError> {
-        let account = buffers.budget(bytes.capacity())?;
-        Self::unpacked(bytes, &account)
+        let budget = buffers.budget(bytes.capacity())?;
+        Self::unpacked(bytes, &budget)
     }
 
-    fn unpacked(bytes: Vec<u8>, account: &ReadBudget) -> Result<Self, FrameError> {
-        no_panic(|| Self::counted(bytes, account))
+    fn unpacked(bytes: Vec<u8>, budget: &ReadBudget) -> Result<Self, FrameError> {
+        no_panic(|| Self::counted(bytes, budget))
     }
 
-    fn counted(mut bytes: Vec<u8>, account: &ReadBudget) -> Result<Self, FrameError> {
+    fn counted(mut bytes: Vec<u8>, budget: &ReadBudget) -> Result<Self, FrameError> {
         if let Some(format) = FrameFormat::detect(&bytes).filter(|format| format.is_compressed()) {
             let packed = std::mem::take(&mut bytes);
-            bytes = compressed::unpack(&packed, format, account)?;
-            account.release(packed.capacity() as u64);
+            bytes = compressed::unpack(&packed, format, budget)?;
+            budget.release(packed.capacity() as u64);
         }
         let format = FrameFormat::detect(&bytes);
         let (count, broken) = match format {
-            Some(FrameFormat::Fits) => fits::count_pages(&bytes, account),
-            Some(FrameFormat::Tiff) => tiff::count_pages(&bytes, account),
+            Some(FrameFormat::Fits) => fits::count_pages(&bytes, budget),
+            Some(FrameFormat::Tiff) => tiff::count_pages(&bytes, budget),
             _ => (1, None),
         };
         match (count, format) {
             // The error that reading the first image gives tells more.
-            (0, _) => decode_image(&bytes, None, account, Vec::new()).map(|_| ())?,
+            (0, _) => decode_image(&bytes, None, budget, Vec::new()).map(|_| ())?,
             (MAX_PAGES.., Some(format)) => {
                 return Err(FrameError::Unsupported {
                     format,
@@ -115,9 +115,9 @@ impl Pages {
         {
             return Err(error);
         }
-        let account = buffers.budget(self.bytes.capacity())?;
+        let budget = buffers.budget(self.bytes.capacity())?;
         let page = NonZeroUsize::new(self.next);
-        let frame = no_panic(|| decode_image(&self.bytes, page, &account, Vec::new()));
+        let frame = no_panic(|| decode_image(&self.bytes, page, &budget, Vec::new()));
         if self.next == self.count && frame.is_err() {
             // What breaks the last image also hides what comes after it.
             self.broken = None;

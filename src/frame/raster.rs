@@ -18,7 +18,7 @@ use std::io::{Cursor, ErrorKind};
 /// defines.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_png(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_png(bytes: &[u8], budget: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Png;
     // Checked first, so that the decoder allocates nothing for absurd sizes.
     if let (Some(width), Some(height)) = (word(bytes, 16), word(bytes, 20)) {
@@ -27,8 +27,8 @@ pub(super) fn decode_png(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'st
             u32::from_be_bytes(height) as usize,
         )?;
     }
-    let decoder = PngDecoder::with_limits(account.timed(Cursor::new(bytes)), limits())
-        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
+    let decoder = PngDecoder::with_limits(budget.timed(Cursor::new(bytes)), limits())
+        .map_err(|e| budget.why(error_of(e, format, bytes.len())))?;
     let step = match decoder.original_color_type() {
         ExtendedColorType::L1 => 255.0,
         ExtendedColorType::L2 => 85.0,
@@ -36,7 +36,7 @@ pub(super) fn decode_png(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'st
         _ => 1.0,
     };
     let exif = exif_of_png(bytes);
-    let mut frame = decode_with(decoder, exif, format, bytes.len(), account)?;
+    let mut frame = decode_with(decoder, exif, format, bytes.len(), budget)?;
     frame.step_adu = frame.step_adu.max(step);
     Ok(frame)
 }
@@ -44,7 +44,7 @@ pub(super) fn decode_png(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'st
 /// Decodes a Windows bitmap.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_bmp(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_bmp(bytes: &[u8], budget: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     /// Minimum length of a header that stores width and height in four bytes each.
     const LONG_HEADER: u32 = 16;
     let format = FrameFormat::Bmp;
@@ -57,20 +57,20 @@ pub(super) fn decode_bmp(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'st
         let side = |word| i32::from_le_bytes(word).unsigned_abs() as usize;
         check_size(side(width), side(height))?;
     }
-    let decoder = BmpDecoder::new(account.timed(Cursor::new(bytes)))
-        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
-    decode_with(decoder, None, format, bytes.len(), account)
+    let decoder = BmpDecoder::new(budget.timed(Cursor::new(bytes)))
+        .map_err(|e| budget.why(error_of(e, format, bytes.len())))?;
+    decode_with(decoder, None, format, bytes.len(), budget)
 }
 
 /// Decodes a portable anymap: PBM, PGM, PPM (plain or binary) or PAM, with the levels of the file.
 /// # Errors
 /// As [`super::reader::decode`].
-pub(super) fn decode_pnm(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'static>, FrameError> {
+pub(super) fn decode_pnm(bytes: &[u8], budget: &ReadBudget) -> Result<Frame<'static>, FrameError> {
     let format = FrameFormat::Pnm;
-    let decoder = PnmDecoder::new(account.timed(Cursor::new(bytes)))
-        .map_err(|e| account.why(error_of(e, format, bytes.len())))?;
+    let decoder = PnmDecoder::new(budget.timed(Cursor::new(bytes)))
+        .map_err(|e| budget.why(error_of(e, format, bytes.len())))?;
     let maxval = decoder.header().maximal_sample();
-    let mut decoded = Decoded::new(decoder, format, bytes.len(), account)?;
+    let mut decoded = Decoded::new(decoder, format, bytes.len(), budget)?;
     // The decoder scales levels from 0..=maxval to all of 8 or 16 bits, and rounds: this is undone.
     let level = |scaled: u16, full: u16| {
         let level = f64::from(scaled) * f64::from(maxval) / f64::from(full);
@@ -79,18 +79,18 @@ pub(super) fn decode_pnm(bytes: &[u8], account: &ReadBudget) -> Result<Frame<'st
     match (decoded.depth, u16::try_from(maxval)) {
         (BitDepth::Eight, Ok(maxval @ 0..=0xff)) => {
             for levels in decoded.octets_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
-                account.check_time()?;
+                budget.check_time()?;
                 let unscaled = |v: &mut u8| *v = level((*v).into(), 0xff) as u8;
                 levels.iter_mut().for_each(unscaled);
             }
-            decoded.integers(decoded.image.as_bytes(), maxval as u8, account)
+            decoded.integers(decoded.image.as_bytes(), maxval as u8, budget)
         }
         (BitDepth::Sixteen, Ok(maxval)) => {
             for levels in decoded.words_mut().chunks_mut(PIXELS_BETWEEN_CHECKS) {
-                account.check_time()?;
+                budget.check_time()?;
                 levels.iter_mut().for_each(|v| *v = level(*v, u16::MAX));
             }
-            decoded.integers(decoded.words(), maxval, account)
+            decoded.integers(decoded.words(), maxval, budget)
         }
         _ => Err(unsupported(
             format,
@@ -147,12 +147,12 @@ fn decode_with(
     exif: Option<&[u8]>,
     format: FrameFormat,
     found_bytes: usize,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
-    let decoded = Decoded::new(decoder, format, found_bytes, account)?;
+    let decoded = Decoded::new(decoder, format, found_bytes, budget)?;
     let frame = match decoded.depth {
-        BitDepth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX, account),
-        BitDepth::Sixteen => decoded.integers(decoded.words(), u16::MAX, account),
+        BitDepth::Eight => decoded.integers(decoded.image.as_bytes(), u8::MAX, budget),
+        BitDepth::Sixteen => decoded.integers(decoded.words(), u16::MAX, budget),
     }?;
     drop(decoded);
     let metadata = exif.map(|exif| exif::metadata(exif, frame.width));
@@ -178,12 +178,12 @@ impl Decoded {
         decoder: impl ImageDecoder,
         format: FrameFormat,
         found_bytes: usize,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Self, FrameError> {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
         check_size(width, height)?;
-        account.check_image(
+        budget.check_image(
             Size::new(width, height),
             bytes_per_pixel(decoder.color_type()),
         )?;
@@ -196,7 +196,7 @@ impl Decoded {
             other => return Err(unsupported(format, format!("{other:?}"))),
         };
         let image = DynamicImage::from_decoder(decoder)
-            .map_err(|e| account.why(error_of(e, format, found_bytes)))?;
+            .map_err(|e| budget.why(error_of(e, format, found_bytes)))?;
         Ok(Self {
             image,
             channels: usize::from(color.channel_count()),
@@ -241,7 +241,7 @@ impl Decoded {
         &self,
         values: &[T],
         full_scale: T,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.image.width() as usize,
@@ -249,7 +249,7 @@ impl Decoded {
             values,
             channels: self.channels,
         };
-        frame_from_integers(&samples, full_scale, account)
+        frame_from_integers(&samples, full_scale, budget)
     }
 }
 

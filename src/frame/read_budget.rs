@@ -1,4 +1,4 @@
-//! What reading a frame may take, memory on one account and time, and what of its colors is wanted.
+//! What reading a frame may take, memory and time, and what of its colors is wanted.
 
 use super::error::FrameError;
 use super::memory::MemoryLimit;
@@ -13,7 +13,7 @@ pub(super) const PIXELS_BETWEEN_CHECKS: usize = 1 << 16;
 /// What a pixel of a frame of floats takes at least: later on its values are copied once.
 pub(super) const FLOATS_BYTES_PER_PIXEL: usize = 2 * size_of::<f32>();
 
-/// The account of one frame. Readers and decoders book on it what they hold before they allocate it,
+/// The budget of one frame. Readers and decoders charge to it what they hold before they allocate it,
 /// and ask it whether to go on.
 #[derive(Debug, Default)]
 pub(super) struct ReadBudget {
@@ -25,7 +25,7 @@ pub(super) struct ReadBudget {
 }
 
 impl ReadBudget {
-    /// An account on which nothing is booked.
+    /// A budget of which nothing is spent.
     pub fn new(limit: MemoryLimit, interrupt: Interrupt) -> Self {
         Self {
             limit,
@@ -226,11 +226,11 @@ mod tests {
 
     #[test]
     fn what_is_held_counts() {
-        let account = ReadBudget::new(MemoryLimit::of_bytes(1000), Interrupt::default());
-        account.hold(600).unwrap();
-        assert!(account.check_image(Size::new(10, 10), 4).is_ok());
-        assert!(account.check_image(Size::new(10, 10), 5).is_err());
-        let error = account.hold(401).unwrap_err();
+        let budget = ReadBudget::new(MemoryLimit::of_bytes(1000), Interrupt::default());
+        budget.hold(600).unwrap();
+        assert!(budget.check_image(Size::new(10, 10), 4).is_ok());
+        assert!(budget.check_image(Size::new(10, 10), 5).is_err());
+        let error = budget.hold(401).unwrap_err();
         assert!(matches!(
             error,
             FrameError::OutOfMemory {
@@ -238,9 +238,9 @@ mod tests {
                 ..
             }
         ));
-        account.release(200);
-        assert_eq!(account.left_bytes(), 600);
-        assert!(account.hold(u64::MAX).is_err());
+        budget.release(200);
+        assert_eq!(budget.left_bytes(), 600);
+        assert!(budget.hold(u64::MAX).is_err());
     }
 
     #[test]
@@ -250,9 +250,9 @@ mod tests {
             let is_due = Arc::clone(&is_due);
             move || is_due.load(Ordering::Relaxed)
         });
-        let account = ReadBudget::new(MemoryLimit::DEFAULT, interrupt);
+        let budget = ReadBudget::new(MemoryLimit::DEFAULT, interrupt);
         let content = vec![7; 1 << 20];
-        let mut reader = account.timed(Cursor::new(&content));
+        let mut reader = budget.timed(Cursor::new(&content));
         let mut found = vec![0; 1 << 19];
         reader.read_exact(&mut found).unwrap();
         assert_eq!(found, content[..1 << 19]);
@@ -263,7 +263,7 @@ mod tests {
         let mut reads = 0..1000;
         assert!(reads.any(|_| reader.read(&mut byte).is_err()));
         assert!(matches!(
-            account.why(FrameError::Empty),
+            budget.why(FrameError::Empty),
             FrameError::Interrupted(_)
         ));
     }

@@ -73,9 +73,9 @@ impl Buffers {
         const BLUE: usize = 2;
         let page = self.color_page?;
         let decode = |channel: usize, held_bytes: u64| {
-            let account = ReadBudget::new(self.memory, Interrupt::default()).of_channel(channel);
-            account.hold(self.beside_bytes + held_bytes).ok()?;
-            decode_with(&self.bytes, page, &account, Vec::new()).ok()
+            let budget = ReadBudget::new(self.memory, Interrupt::default()).of_channel(channel);
+            budget.hold(self.beside_bytes + held_bytes).ok()?;
+            decode_with(&self.bytes, page, &budget, Vec::new()).ok()
         };
         let held_bytes = held.pixels.bytes();
         let red = decode(RED, held_bytes)?;
@@ -90,17 +90,17 @@ impl Buffers {
 
     /// Whether there is room for the values of `frame`, which was read last, as floats beside it.
     pub(crate) fn check_floats(&self, frame: &Frame) -> Result<(), FrameError> {
-        let account = ReadBudget::new(self.memory_of_frame(), self.interrupt.clone());
-        account.hold(frame.pixels.bytes())?;
-        account.check_image(frame.size(), size_of::<f32>())
+        let budget = ReadBudget::new(self.memory_of_frame(), self.interrupt.clone());
+        budget.hold(frame.pixels.bytes())?;
+        budget.check_image(frame.size(), size_of::<f32>())
     }
 
-    /// An account for one frame, whose file is in `bytes`.
+    /// A budget for one frame, whose file is in `bytes`.
     pub(super) fn budget(&mut self, bytes: usize) -> Result<ReadBudget, FrameError> {
         self.beside_bytes = bytes as u64;
-        let account = ReadBudget::new(self.memory, self.interrupt.clone());
-        account.hold(self.beside_bytes)?;
-        Ok(account)
+        let budget = ReadBudget::new(self.memory, self.interrupt.clone());
+        budget.hold(self.beside_bytes)?;
+        Ok(budget)
     }
 }
 
@@ -166,18 +166,18 @@ fn read_expected(
     let mut pixels = std::mem::take(&mut buffers.pixels);
     bytes.clear();
     bytes.shrink_to(usize::try_from(expected).unwrap_or(usize::MAX));
-    let account = buffers.budget(bytes.capacity())?;
-    if expected > account.left_bytes() / 2 {
+    let budget = buffers.budget(bytes.capacity())?;
+    if expected > budget.left_bytes() / 2 {
         pixels = Vec::new();
     } else {
         pixels.clear();
         pixels.shrink_to(expected as usize / size_of::<u16>());
     }
-    read_limited(stream, expected, &account, &mut bytes)?;
+    read_limited(stream, expected, &budget, &mut bytes)?;
     buffers.beside_bytes = bytes.capacity() as u64;
-    let frame = decode_with(&bytes, page, &account, pixels);
+    let frame = decode_with(&bytes, page, &budget, pixels);
     buffers.bytes = bytes;
-    buffers.color_page = account.has_colors().then_some(page);
+    buffers.color_page = budget.has_colors().then_some(page);
     frame
 }
 
@@ -185,16 +185,16 @@ fn read_expected(
 pub(super) fn read_limited(
     stream: impl Read,
     expected: u64,
-    account: &ReadBudget,
+    budget: &ReadBudget,
     bytes: &mut Vec<u8>,
 ) -> Result<(), FrameError> {
-    let mut stream = account.timed(stream);
-    account.reserve(bytes, HEAD_BYTES as usize)?;
+    let mut stream = budget.timed(stream);
+    budget.reserve(bytes, HEAD_BYTES as usize)?;
     stream
         .by_ref()
         .take(HEAD_BYTES)
         .read_to_end(bytes)
-        .map_err(|error| account.why(error.into()))?;
+        .map_err(|error| budget.why(error.into()))?;
     if FrameFormat::detect(bytes).is_none() {
         return Err(not_an_image(bytes));
     }
@@ -202,9 +202,9 @@ pub(super) fn read_limited(
     if expected > limit {
         return Err(FrameError::TooManyBytes { limit });
     }
-    account.reserve(bytes, expected as usize)?;
+    budget.reserve(bytes, expected as usize)?;
     let rest = (limit + 1).saturating_sub(bytes.len() as u64);
-    account.append(&mut stream.take(rest), bytes)?;
+    budget.append(&mut stream.take(rest), bytes)?;
     if bytes.len() as u64 > limit {
         return Err(FrameError::TooManyBytes { limit });
     }
@@ -257,22 +257,22 @@ pub fn decode_page_with(
     page: Option<NonZeroUsize>,
     buffers: &mut Buffers,
 ) -> Result<Frame<'static>, FrameError> {
-    let account = buffers.budget(bytes.len())?;
-    decode_with(bytes, page, &account, std::mem::take(&mut buffers.pixels))
+    let budget = buffers.budget(bytes.len())?;
+    decode_with(bytes, page, &budget, std::mem::take(&mut buffers.pixels))
 }
 
 fn decode_with(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     no_panic(|| match FrameFormat::detect(bytes) {
         Some(format) if format.is_compressed() => {
-            let content = compressed::unpack(bytes, format, account)?;
-            decode_image(&content, page, account, buffer)
+            let content = compressed::unpack(bytes, format, budget)?;
+            decode_image(&content, page, budget, buffer)
         }
-        _ => decode_image(bytes, page, account, buffer),
+        _ => decode_image(bytes, page, budget, buffer),
     })
 }
 
@@ -286,12 +286,12 @@ pub(super) fn no_panic<R>(decode: impl FnOnce() -> Result<R, FrameError>) -> Res
 pub(super) fn decode_image(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     let single = |read: fn(&[u8], &ReadBudget) -> Result<Frame<'static>, FrameError>| match page {
         Some(page) if page.get() > 1 => Err(FrameError::NoSuchPage { page, pages: 1 }),
-        _ => read(bytes, account),
+        _ => read(bytes, budget),
     };
     let format = FrameFormat::detect(bytes);
     let buffer = match format {
@@ -299,10 +299,10 @@ pub(super) fn decode_image(
         _ => Vec::new(),
     };
     match format {
-        Some(FrameFormat::Fits) => fits::decode(bytes, page, account),
+        Some(FrameFormat::Fits) => fits::decode(bytes, page, budget),
         Some(FrameFormat::Tiff) => match unsupported_formats::raw_tiff(bytes) {
             Some(known) => Err(known.into()),
-            None => tiff::decode(bytes, page, account, buffer),
+            None => tiff::decode(bytes, page, budget, buffer),
         },
         Some(FrameFormat::Png) => single(raster::decode_png),
         Some(FrameFormat::Jpeg) => single(jpeg::decode),

@@ -504,12 +504,12 @@ fn an_endless_stream_is_refused_if_no_image_or_too_long() {
     let nothing = read_stream(std::io::empty(), None, &mut Buffers::new()).unwrap_err();
     assert!(matches!(nothing, FrameError::Empty), "{nothing}");
     let endless = || (&b"P5 3 3 255\n"[..]).chain(std::io::repeat(7));
-    let account = || ReadBudget::new(MemoryLimit::of_bytes(30_000), Interrupt::default());
-    let error = read_limited(endless(), 0, &account(), &mut Vec::new()).unwrap_err();
+    let budget = || ReadBudget::new(MemoryLimit::of_bytes(30_000), Interrupt::default());
+    let error = read_limited(endless(), 0, &budget(), &mut Vec::new()).unwrap_err();
     assert!(matches!(error, FrameError::OutOfMemory { .. }), "{error}");
     for length in [20, 4096, 5000, 10_000] {
         let mut bytes = Vec::new();
-        read_limited(endless().take(length), 99, &account(), &mut bytes).unwrap();
+        read_limited(endless().take(length), 99, &budget(), &mut bytes).unwrap();
         assert_eq!(bytes.len() as u64, length);
     }
 }

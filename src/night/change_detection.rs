@@ -17,7 +17,7 @@ const IN_A_ROW: usize = 3;
 /// Standard deviations above the usual.
 const SIGMAS: f64 = 4.0;
 
-/// Part of the way to the limit at which a departure begins or ends.
+/// Part of the way to the limit at which a change begins or ends.
 const BEGUN: f64 = 1.0 / 3.0;
 
 /// A part of a series that is not usual.

@@ -132,9 +132,9 @@ impl<'a> DatedRows<'a> {
         let mut all = site.map_or(Vec::new(), |site| self.of_almanac(site));
         all.extend(self.clouds());
         all.extend(self.optics());
-        all.extend(knocks.iter().filter_map(|knock| {
-            let mut moment = self.at(MomentKind::Knock, knock.frame)?;
-            moment.angle_deg = finite(knock.shift_deg, 3);
+        all.extend(knocks.iter().filter_map(|jump| {
+            let mut moment = self.at(MomentKind::Knock, jump.frame)?;
+            moment.angle_deg = finite(jump.shift_deg, 3);
             Some(moment)
         }));
         all.sort_by(|a, b| a.mjd.total_cmp(&b.mjd).then(a.kind.cmp(&b.kind)));
@@ -225,32 +225,32 @@ impl<'a> DatedRows<'a> {
 
     /// When stars grow wider or dimmer.
     fn optics(&self) -> Vec<Moment> {
-        let is_told = |row: &&NightRow| row.is_identified();
+        let is_identified = |row: &&NightRow| row.is_identified();
         let of = |value: fn(&NightRow) -> Option<f64>| -> Vec<Option<f64>> {
-            let told = |row: &NightRow| Some(row).filter(is_told).and_then(value);
-            self.rows.iter().map(told).collect()
+            let value_of = |row: &NightRow| Some(row).filter(is_identified).and_then(value);
+            self.rows.iter().map(value_of).collect()
         };
         let widths = of(|row| row.spot_sigma_px.filter(|px| *px > 0.0).map(libm::log));
         let wider = find_changes(&widths, MIN_WIDENING);
         let dimmer = find_changes(&of(|row| row.dimming_mag), MIN_DIMMING_MAG);
         let meets = |a: &DetectedChange, b: &DetectedChange| {
-            let last = |departure: &DetectedChange| departure.end.unwrap_or(self.rows.len());
+            let last = |change: &DetectedChange| change.end.unwrap_or(self.rows.len());
             a.start < last(b) && b.start < last(a)
         };
         let mut moments = Vec::new();
-        for departure in &wider {
-            let is_dimmer = dimmer.iter().any(|other| meets(departure, other));
+        for change in &wider {
+            let is_dimmer = dimmer.iter().any(|other| meets(change, other));
             let kind = if is_dimmer {
                 MomentKind::Dew
             } else {
                 MomentKind::Focus
             };
-            moments.extend(self.at(kind, departure.start));
+            moments.extend(self.at(kind, change.start));
         }
         let alone = dimmer
             .iter()
-            .filter(|departure| !wider.iter().any(|other| meets(departure, other)));
-        moments.extend(alone.filter_map(|departure| self.at(MomentKind::Dimming, departure.start)));
+            .filter(|change| !wider.iter().any(|other| meets(change, other)));
+        moments.extend(alone.filter_map(|change| self.at(MomentKind::Dimming, change.start)));
         moments
     }
 

@@ -313,17 +313,17 @@ mod tests {
 
     #[test]
     fn stars_are_told_from_their_trails() {
-        let told = |frame: &Frame| is_trailed(frame, &LightStatistics::of(frame));
-        assert!(!told(&frame(stars)));
-        assert!(told(&frame(trails)));
-        assert!(!told(&frame(|x, y| circle(x, y, 60.0))));
+        let has_trails = |frame: &Frame| is_trailed(frame, &LightStatistics::of(frame));
+        assert!(!has_trails(&frame(stars)));
+        assert!(has_trails(&frame(trails)));
+        assert!(!has_trails(&frame(|x, y| circle(x, y, 60.0))));
         // A clouded sky with a bright rim, as above the horizon.
         let rim = |x: f64, y: f64| {
             let inward = 115.0 - libm::hypot(x - 120.0, y - 120.0);
             circle(x, y, 40.0 + 150.0 * libm::exp(-inward / 3.0))
         };
-        assert!(!told(&frame(rim)));
-        assert!(!told(&frame(|_, _| 10.0)));
+        assert!(!has_trails(&frame(rim)));
+        assert!(!has_trails(&frame(|_, _| 10.0)));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 /// Frames whose median pointing is held.
 const RECENT: usize = 15;
-/// Frames that agree with each other and not with what is held before a knock is stated.
+/// Frames that agree with each other and not with what is held before a jump is stated.
 const CONFIRMED: usize = 3;
 /// Pointings that differ by more than these standard errors do not agree,
 const SIGMAS: f64 = 6.0;
@@ -181,11 +181,11 @@ mod tests {
     #[test]
     fn a_knock_is_the_first_of_three_frames_that_agree_elsewhere() {
         let history = after(&[0.0, 0.001, -0.001, 0.0, 1.5, 1.5, 1.501]);
-        let [knock] = history.jumps() else {
+        let [jump] = history.jumps() else {
             panic!("{history:?}");
         };
-        assert_eq!(knock.frame, 4);
-        assert!((knock.shift_deg - 1.5).abs() < 0.01);
+        assert_eq!(jump.frame, 4);
+        assert!((jump.shift_deg - 1.5).abs() < 0.01);
         let (held, _) = history.fixed().unwrap();
         assert!(held.angle_to(&turned(1.5)) < 1e-4);
     }

@@ -155,7 +155,7 @@ fn calibration(applied: &Applied) -> CalibrationReport {
 
 fn date(known: &FrameDate) -> DateReport {
     let has_time = known.date.has_time();
-    let (told_by, ahead) = match known.zone {
+    let (source, ahead) = match known.zone {
         DateZone::Stated => ("stated", None),
         DateZone::Given(ahead) => ("option", Some(ahead)),
         DateZone::ByStars(ahead) => ("stars", Some(ahead)),
@@ -167,7 +167,7 @@ fn date(known: &FrameDate) -> DateReport {
         year: to_decimals(known.date.julian_epoch(), YEAR_DECIMALS),
         source: known.source,
         utc_offset_h: has_time.then(|| ahead.map_or(0.0, hours_of)),
-        utc_offset_source: has_time.then_some(told_by),
+        utc_offset_source: has_time.then_some(source),
         uncertainty_h: known.time_error().hours(),
     }
 }

@@ -37,15 +37,15 @@ impl StatedLimit {
 /// The limits of each cell.
 pub(super) fn limits(
     sky: &CloudInputs,
-    witnesses: &[CellStar],
+    cell_stars: &[CellStar],
     clouds: &[CellClouds],
     stated: Option<&StatedLimit>,
 ) -> Vec<CellLimits> {
     let is_clear = |cell: usize| clouds[cell].clear.is_some_and(|clear| clear > 0.5);
-    let relative: Vec<CountedStar> = witnesses
+    let relative: Vec<CountedStar> = cell_stars
         .iter()
-        .filter(|witness| is_clear(witness.cell))
-        .map(|witness| witness.counted(witness.relative_mag))
+        .filter(|cell_star| is_clear(cell_star.cell))
+        .map(|cell_star| cell_star.counted(cell_star.relative_mag))
         .collect();
     let own = completeness::measure(&relative, sky.chance).limit.ok();
     let by_model = stated
@@ -58,7 +58,7 @@ pub(super) fn limits(
         };
         let over = over_depth.and_then(|expected| {
             let alike = |other: usize| is_clear(other) == is_clear(cell);
-            measured_over_depth(sky, (witnesses, clouds), cell, expected, alike)
+            measured_over_depth(sky, (cell_stars, clouds), cell, expected, alike)
         });
         CellLimits {
             expected_vmag: over_depth.map(|over| over + depth_vmag),
@@ -76,7 +76,7 @@ pub(super) fn limits(
 /// clouds of the cell. `None` where the sky has too few stars, or clouds hide them, or no star tells of the clouds.
 fn measured_over_depth(
     sky: &CloudInputs,
-    (witnesses, clouds): (&[CellStar], &[CellClouds]),
+    (cell_stars, clouds): (&[CellStar], &[CellClouds]),
     cell: usize,
     expected: f64,
     alike: impl Fn(usize) -> bool,
@@ -94,14 +94,14 @@ fn measured_over_depth(
     // Elsewhere stars tell nothing of the clouds here.
     let here = clouds[cell].extinction_mag?;
     let near = |reach: f64| -> Vec<CountedStar> {
-        let near = witnesses.iter().filter(|witness| {
-            let is_near = sky.grid.is_near(cell, &witness.star.direction, reach);
-            is_near && (reach == 1.0 || alike(witness.cell))
+        let near = cell_stars.iter().filter(|cell_star| {
+            let is_near = sky.grid.is_near(cell, &cell_star.star.direction, reach);
+            is_near && (reach == 1.0 || alike(cell_star.cell))
         });
-        let moved = |witness: &CellStar| {
-            let there = clouds[witness.cell].extinction_mag;
+        let moved = |cell_star: &CellStar| {
+            let there = clouds[cell_star.cell].extinction_mag;
             let more_mag = there.map_or(0.0, |there| there.value - here.value);
-            witness.counted(witness.relative_mag + more_mag)
+            cell_star.counted(cell_star.relative_mag + more_mag)
         };
         near.map(moved).collect()
     };

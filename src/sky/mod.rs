@@ -164,12 +164,12 @@ pub(crate) fn measure(
         chance: association.chance,
         is_usual: usual.is_some(),
     };
-    let witnesses = sky.star_counts();
+    let cell_stars = sky.star_counts();
     let clouds::CloudMap {
         cells: clouds,
         fraction: share,
-    } = sky.clouds(&witnesses, &levels);
-    let limits = limits::limits(&sky, &witnesses, &clouds, stated);
+    } = sky.clouds(&cell_stars, &levels);
+    let limits = limits::limits(&sky, &cell_stars, &clouds, stated);
     let light = |cell: usize| curved.as_ref().and_then(|curved| curved.cells[cell]);
     let cells = grid.places.iter().enumerate().map(|(cell, place)| SkyCell {
         place: *place,

@@ -13,7 +13,7 @@ impl RelativeLimit {
     ///
     /// Clouds hide whole stars, too: a larger share of lost ones than is usual is theirs.
     pub(super) fn of_clear_sky(
-        witnesses: &[CellStar],
+        cell_stars: &[CellStar],
         clear_sky: &ClearSky,
         chance: f64,
     ) -> Option<Self> {
@@ -21,27 +21,27 @@ impl RelativeLimit {
         const MAX_LOST: f64 = 0.05;
         /// Stars near which another one is dimmed by more than these standard deviations are behind clouds.
         const DIMMED_SIGMAS: f64 = 3.0;
-        let is_dimmed = |witness: &&CellStar| {
-            let dimmed_by = clear_sky.dimmed_by(witness.star);
+        let is_dimmed = |cell_star: &&CellStar| {
+            let dimmed_by = clear_sky.dimmed_by(cell_star.star);
             dimmed_by.is_some_and(|dimmed_by| dimmed_by.value > DIMMED_SIGMAS * dimmed_by.sigma)
         };
-        let cells = 1 + witnesses.iter().map(|witness| witness.cell).max()?;
+        let cells = 1 + cell_stars.iter().map(|cell_star| cell_star.cell).max()?;
         let mut dimmed = vec![[0usize; 2]; cells];
-        for witness in witnesses
+        for cell_star in cell_stars
             .iter()
-            .filter(|witness| witness.star.measured.is_some())
+            .filter(|cell_star| cell_star.star.measured.is_some())
         {
-            dimmed[witness.cell][0] += 1;
-            dimmed[witness.cell][1] += usize::from(is_dimmed(&witness));
+            dimmed[cell_star.cell][0] += 1;
+            dimmed[cell_star.cell][1] += usize::from(is_dimmed(&cell_star));
         }
-        let is_clear = |witness: &&CellStar| {
-            let [all, dimmed] = dimmed[witness.cell];
+        let is_clear = |cell_star: &&CellStar| {
+            let [all, dimmed] = dimmed[cell_star.cell];
             all > 0 && 4 * dimmed <= all
         };
-        let counted: Vec<CountedStar> = witnesses
+        let counted: Vec<CountedStar> = cell_stars
             .iter()
             .filter(is_clear)
-            .map(|witness| witness.counted(witness.relative_mag))
+            .map(|cell_star| cell_star.counted(cell_star.relative_mag))
             .collect();
         let limit = completeness::measure(&counted, chance).limit.ok()?;
         Some(Self(Limit {

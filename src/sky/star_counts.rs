@@ -1,4 +1,4 @@
-//! The stars as witnesses of the sky in which they are.
+//! The stars as cell_stars of the sky in which they are.
 
 use super::brightness::SkyLevels;
 use super::clear_sky::ClearSky;
@@ -30,7 +30,7 @@ pub(super) struct CloudInputs<'a> {
     pub is_usual: bool,
 }
 
-/// A star as a witness of clouds.
+/// A star as a cell_star of clouds.
 pub(super) struct CellStar<'a> {
     /// The star.
     pub star: &'a SkyStar,
@@ -67,8 +67,8 @@ impl CloudInputs<'_> {
 
     /// The stars in cells whose depth is known.
     pub(super) fn star_counts(&self) -> Vec<CellStar<'_>> {
-        let witness = |star| self.star_count(star);
-        self.stars.iter().filter_map(witness).collect()
+        let cell_star = |star| self.star_count(star);
+        self.stars.iter().filter_map(cell_star).collect()
     }
 
     fn star_count<'s>(&self, star: &'s SkyStar) -> Option<CellStar<'s>> {

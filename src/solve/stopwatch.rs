@@ -110,11 +110,11 @@ mod tests {
 
     #[test]
     fn each_stage_that_is_done_is_told() {
-        let told = Mutex::new(Vec::new());
-        let on_stage = |stage| told.lock().unwrap().push(stage);
+        let reported = Mutex::new(Vec::new());
+        let on_stage = |stage| reported.lock().unwrap().push(stage);
         let mut clock = Stopwatch::start(Some(&on_stage));
         clock.lap(Stage::Read);
         clock.lap(Stage::Detect);
-        assert_eq!(*told.lock().unwrap(), [Stage::Read, Stage::Detect]);
+        assert_eq!(*reported.lock().unwrap(), [Stage::Read, Stage::Detect]);
     }
 }

@@ -18,7 +18,7 @@ pub(super) fn learn(
 ) -> Option<Vec<NightHotPixel>> {
     let order = probe_order(names.len());
     let chosen: Vec<&String> = order.iter().take(FRAMES).map(|at| &names[*at]).collect();
-    let standouts = of_each(&chosen, run.pool, run.plan.memory, |_, frame| {
+    let outliers = of_each(&chosen, run.pool, run.plan.memory, |_, frame| {
         let date = frame.metadata.date;
         if is_by_day(date.as_ref(), start.site) {
             return None;
@@ -26,7 +26,7 @@ pub(super) fn learn(
         let mjd = date.and_then(|date| date.modified_julian_date());
         Some(OutlierPixels::of(&frame.into_stored(), mjd))
     });
-    let found: Vec<OutlierPixels> = standouts.into_iter().flatten().collect();
+    let found: Vec<OutlierPixels> = outliers.into_iter().flatten().collect();
     hot_pixels(&found, start.fixed_camera.as_ref(), start.site)
 }
 

@@ -23,10 +23,10 @@ pub(super) fn of_each<N: AsRef<Path> + Sync, T: Send>(
         let path = name.as_ref();
         tell(path, read_frame(path, None, buffers).ok()?)
     };
-    let mut told = Vec::with_capacity(names.len());
+    let mut frames = Vec::with_capacity(names.len());
     for_each_ordered(pool, names, buffers, read, |_, one| {
-        told.push(one);
+        frames.push(one);
         ControlFlow::Continue(())
     });
-    told
+    frames
 }

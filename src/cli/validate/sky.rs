@@ -120,7 +120,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         Some((row.true_extinction_mag, error, row.extinction_sigma_mag?))
     });
     let limit = dots(|row| Some((row.true_zenith_mag_arcsec2, row.limit_difference_mag?, 0.0)));
-    let told = summary
+    let found = summary
         .clear
         .iter()
         .map(|tenth| (tenth.mean_clear, tenth.share_clear));
@@ -150,7 +150,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
                 y: Axis::new("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
                     PlotLayer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
-                    PlotLayer::new("found", BLUE, Marks::Line(told.collect())),
+                    PlotLayer::new("found", BLUE, Marks::Line(found.collect())),
                 ],
             },
         ],

@@ -16,7 +16,7 @@ use multiversion::multiversion;
 
 /// Stars fitted at the same time.
 const BATCH: usize = 16;
-/// Most lobes of a spot that is fitted in a batch.
+/// Most components of a spot that is fitted in a batch.
 pub(crate) const MAX_BATCH_COMPONENTS: usize = 8;
 /// A value for each of them.
 type PerStar = [f32; BATCH];
@@ -52,13 +52,13 @@ pub(crate) struct BatchFitter {
     side: usize,
     /// Row by row: the pixels above the background map, in units of the noise; NaN where left out.
     data: Vec<PerStar>,
-    /// Lobes of the spot with most of them; 1 where all are single Gaussians.
+    /// Components of the spot with most of them; 1 where all are single Gaussians.
     components: usize,
-    /// Profiles of the first lobe of each spot along x and y, of the second, …
+    /// Profiles of the first component of each spot along x and y, of the second, …
     axes: [Axes; MAX_BATCH_COMPONENTS],
 }
 
-/// Profiles of a lobe of each spot along x and y.
+/// Profiles of a component of each spot along x and y.
 #[derive(Debug, Clone, Default)]
 struct Axes {
     across: Vec<ProfilePart<PerStar>>,
@@ -107,7 +107,7 @@ impl BatchFitter {
     }
 
     /// [`Self::fit`] in windows that `cut` fills for each initial guess. Spots may have up to
-    /// [`MAX_BATCH_COMPONENTS`] lobes; their size is then held.
+    /// [`MAX_BATCH_COMPONENTS`] components; their size is then held.
     pub fn fit_cut(
         &mut self,
         mut cut: impl FnMut(&BatchStart, &mut Window),
@@ -208,14 +208,14 @@ impl BatchFitter {
                 let Some(spot) = fit.spots.first() else {
                     continue;
                 };
-                let lobe = window.psf.components.get(number);
+                let component = window.psf.components.get(number);
                 let is_single = window.psf.is_gaussian() && number == 0;
-                let [dx, dy] = lobe.map_or([0.0; 2], |lobe| lobe.offset_px);
-                let share = lobe.map_or(0.0, |lobe| lobe.share);
+                let [dx, dy] = component.map_or([0.0; 2], |component| component.offset_px);
+                let share = component.map_or(0.0, |component| component.share);
                 axes.weight[lane] = if is_single { 1.0 } else { share as f32 };
                 centers_px[0][lane] = spot.x - window.x0 as f64 + dx;
                 centers_px[1][lane] = spot.y - window.y0 as f64 + dy;
-                let sigma_px = lobe.map_or(fit.spot_px, |lobe| lobe.sigma_px);
+                let sigma_px = component.map_or(fit.spot_px, |component| component.sigma_px);
                 cumulative[lane] = Cumulative::of_spot(sigma_px);
             }
             let Axes { across, down, .. } = axes;
@@ -316,17 +316,17 @@ fn fill(
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn sums_over<const COMPONENTS: usize>(
     data: &[PerStar],
-    lobes: &[Axes; MAX_BATCH_COMPONENTS],
+    components: &[Axes; MAX_BATCH_COMPONENTS],
     model: &BatchModel,
 ) -> BatchSums {
     let mut matrix = [[[0.0f32; BATCH]; ONE_SPOT]; ONE_SPOT];
     let mut right = [[0.0f32; BATCH]; ONE_SPOT];
     let [mut chi2, mut pixels] = [[0.0f32; BATCH]; 2];
     let mut shapes = [[0.0f32; BATCH]; 3];
-    let side = lobes[0].across.len();
-    let shares: [PerStar; COMPONENTS] = std::array::from_fn(|i| lobes[i].weight);
-    let across: [Profile; COMPONENTS] = std::array::from_fn(|i| &lobes[i].across[..side]);
-    let down: [Profile; COMPONENTS] = std::array::from_fn(|i| &lobes[i].down[..side]);
+    let side = components[0].across.len();
+    let shares: [PerStar; COMPONENTS] = std::array::from_fn(|i| components[i].weight);
+    let across: [Profile; COMPONENTS] = std::array::from_fn(|i| &components[i].across[..side]);
+    let down: [Profile; COMPONENTS] = std::array::from_fn(|i| &components[i].down[..side]);
     let model = *model;
     for (y, row) in data.chunks_exact(side.max(1)).enumerate().take(side) {
         // Copied so that the compiler need not assume aliasing.
@@ -341,12 +341,12 @@ fn sums_over<const COMPONENTS: usize>(
                 let flux = model.flux[lane];
                 let mut parts = [0.0f32; 4];
                 for ((across, down), share) in acrosses.iter().zip(&downs).zip(&shares) {
-                    let of_lobe = spot_gradient(flux, &across.lane(lane), &down.lane(lane));
+                    let of_component = spot_gradient(flux, &across.lane(lane), &down.lane(lane));
                     if COMPONENTS == 1 {
-                        parts = of_lobe;
+                        parts = of_component;
                     } else {
-                        for (part, of_lobe) in parts.iter_mut().zip(of_lobe) {
-                            *part += share[lane] * of_lobe;
+                        for (part, of_component) in parts.iter_mut().zip(of_component) {
+                            *part += share[lane] * of_component;
                         }
                     }
                 }

@@ -1,4 +1,4 @@
-//! The light of an effective PSF in a window: from its table, or the sum over its lobes.
+//! The light of an effective PSF in a window: from its table, or the sum over its components.
 
 use super::light::{GroupLight, SpotLight};
 use super::window::Window;
@@ -71,7 +71,7 @@ struct DrawnSpot {
     size: Size,
 }
 
-/// Adds the lobes of a PSF to the pixels of a window.
+/// Adds the components of a PSF to the pixels of a window.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_components<const PARTS: usize>(
     psf: &LocalPsf,
@@ -85,17 +85,17 @@ fn draw_components<const PARTS: usize>(
         size,
     } = *window;
     let width = size.width.div_ceil(GROUP_PX);
-    for lobe in &psf.components {
-        let [dx, dy] = lobe.offset_px;
+    for component in &psf.components {
+        let [dx, dy] = component.offset_px;
         let place = [x_px + scale * dx, y_px + scale * dy];
-        let part = profiles.fill(place, scale * lobe.sigma_px, size);
-        // What a larger spot moves, and widens, its lobes by.
-        let by_spot = [dx, dy, lobe.sigma_px].map(|part| (part / psf.spot_px) as f32);
-        add_component::<PARTS>(lobe.share as f32, by_spot, profiles, part, into, width);
+        let part = profiles.fill(place, scale * component.sigma_px, size);
+        // What a larger spot moves, and widens, its components by.
+        let by_spot = [dx, dy, component.sigma_px].map(|part| (part / psf.spot_px) as f32);
+        add_component::<PARTS>(component.share as f32, by_spot, profiles, part, into, width);
     }
 }
 
-/// Adds a lobe to the rows of `width` groups.
+/// Adds a component to the rows of `width` groups.
 #[allow(
     clippy::needless_range_loop,
     reason = "lanes of several arrays read best as indices"

@@ -21,7 +21,7 @@ pub(crate) const FIELD_TERMS: usize = 9;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FieldComponent {
     /// Where its share is that of the centre of the frame.
-    pub lobe: GaussianComponent,
+    pub component: GaussianComponent,
     /// Its share in the corners, where the spots turn with the field.
     pub corner_share: f64,
 }
@@ -46,7 +46,7 @@ impl LocalPsf {
         self.table.copy_from(&other.table);
     }
 
-    /// Tabulates the lobes, unless they are too sharp.
+    /// Tabulates the components, unless they are too sharp.
     pub fn tabulate(&mut self) {
         let mut extent = ComponentExtent::default();
         extent.add(&self.components);
@@ -149,7 +149,7 @@ pub(crate) enum FieldForm {
     Symmetric,
     /// Not at all.
     Fixed,
-    /// They point outward, and their lobes' shares change linearly from the centre to the corners:
+    /// They point outward, and their components' shares change linearly from the centre to the corners:
     /// coma.
     Radial,
 }
@@ -162,7 +162,7 @@ pub(crate) struct EffectivePsf {
     pub components: Vec<FieldComponent>,
     /// How they change over the field.
     pub form: FieldForm,
-    /// Moments that the lobes have as they are.
+    /// Moments that the components have as they are.
     pub typical: SpotMoments,
     /// Moments over the field.
     pub moments: FieldMoments,
@@ -175,17 +175,17 @@ pub(crate) struct EffectivePsf {
 impl EffectivePsf {
     /// Round Gaussians of these sizes; elongations are left out.
     pub fn gaussian(moments: FieldMoments, spot_px: f64, radius_px: usize) -> Self {
-        let lobe = GaussianComponent {
+        let component = GaussianComponent {
             offset_px: [0.0; 2],
             sigma_px: spot_px,
             share: 1.0,
         };
-        let lobe = FieldComponent {
-            lobe,
+        let component = FieldComponent {
+            component,
             corner_share: 1.0,
         };
         Self {
-            components: vec![lobe],
+            components: vec![component],
             form: FieldForm::Symmetric,
             typical: [libm::log(spot_px), 0.0, 0.0],
             moments,
@@ -225,21 +225,23 @@ impl EffectivePsf {
     /// The spot at a pixel, its centre of light at its place.
     pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
         self.place_components(x_px, y_px, local);
-        let lobes = &mut local.components;
-        let sum: f64 = lobes.iter().map(|lobe| lobe.share).sum();
+        let components = &mut local.components;
+        let sum: f64 = components.iter().map(|component| component.share).sum();
         for axis in 0..2 {
-            let moments = lobes.iter().map(|lobe| lobe.share * lobe.offset_px[axis]);
+            let moments = components
+                .iter()
+                .map(|component| component.share * component.offset_px[axis]);
             let centre = moments.sum::<f64>() / sum;
-            for lobe in lobes.iter_mut() {
-                lobe.offset_px[axis] -= centre;
+            for component in components.iter_mut() {
+                component.offset_px[axis] -= centre;
             }
         }
-        for lobe in lobes {
-            lobe.share /= sum;
+        for component in components {
+            component.share /= sum;
         }
     }
 
-    /// The lobes at a pixel, about the point that their offsets refer to.
+    /// The components at a pixel, about the point that their offsets refer to.
     pub fn place_components(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
         let here = self.moments.at(x_px, y_px);
         let mut stretch = product(root(here), inverse_root(self.typical));
@@ -263,7 +265,7 @@ impl EffectivePsf {
                     offset_px: [x, y],
                     sigma_px,
                     share,
-                } = of_field.lobe;
+                } = of_field.component;
                 GaussianComponent {
                     offset_px: stretch.map(|[a, b]| a * x + b * y),
                     sigma_px: scale * sigma_px,
@@ -360,8 +362,8 @@ mod tests {
         moments.coefficients[0][1] = 0.3;
         moments.coefficients[1][1] = 0.8;
         let offsets = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-        let lobe = |offset_px: [f64; 2]| FieldComponent {
-            lobe: GaussianComponent {
+        let component = |offset_px: [f64; 2]| FieldComponent {
+            component: GaussianComponent {
                 offset_px,
                 sigma_px: 0.5,
                 share: 0.25,
@@ -369,7 +371,7 @@ mod tests {
             corner_share: 0.25,
         };
         let psf = EffectivePsf {
-            components: offsets.map(lobe).to_vec(),
+            components: offsets.map(component).to_vec(),
             form: FieldForm::Fixed,
             typical: [0.0; 3],
             moments,
@@ -380,7 +382,10 @@ mod tests {
         psf.at(50.0, 50.0, &mut local);
         assert_eq!(
             local.components,
-            psf.components.iter().map(|l| l.lobe).collect::<Vec<_>>()
+            psf.components
+                .iter()
+                .map(|l| l.component)
+                .collect::<Vec<_>>()
         );
         psf.at(100.0, 50.0, &mut local);
         let moment = |i: usize| {

@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 pub(crate) struct FieldTables<'a> {
     /// The PSF.
     pub psf: &'a EffectivePsf,
-    /// `None` where the lobes are too sharp for a table: they are summed instead.
+    /// `None` where the components are too sharp for a table: they are summed instead.
     layout: Option<TableLayout>,
     /// Distance of the nodes along x and y, in pixels.
     cell_px: [f64; 2],
@@ -57,7 +57,7 @@ impl<'a> FieldTables<'a> {
         self.psf.window_radius(spot_px)
     }
 
-    /// The spot at a pixel: its table, or its lobes.
+    /// The spot at a pixel: its table, or its components.
     pub fn at(&self, x_px: f64, y_px: f64, local: &mut LocalPsf) {
         let Some(layout) = self.layout else {
             self.psf.at(x_px, y_px, local);
@@ -116,7 +116,7 @@ impl<'a> FieldTables<'a> {
         })
     }
 
-    /// The lobes at a node.
+    /// The components at a node.
     fn components_at(&self, node: [usize; 2], local: &mut LocalPsf) {
         let [x, y] = [0, 1].map(|axis| node[axis] as f64 * self.cell_px[axis]);
         self.psf.at(x, y, local);
@@ -182,12 +182,12 @@ mod tests {
         moments.coefficients[0][5] = 0.69;
         moments.coefficients[1][3] = 0.4;
         moments.range = [[0.0, 0.69], [0.0, 0.4], [0.0, 0.0]];
-        let lobe = |lobe: GaussianComponent| FieldComponent {
-            lobe,
-            corner_share: lobe.share,
+        let component = |component: GaussianComponent| FieldComponent {
+            component,
+            corner_share: component.share,
         };
         let psf = EffectivePsf {
-            components: components(0.6).into_iter().map(lobe).collect(),
+            components: components(0.6).into_iter().map(component).collect(),
             form: FieldForm::Fixed,
             typical: [0.0; 3],
             moments,

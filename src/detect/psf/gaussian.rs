@@ -91,7 +91,7 @@ pub(crate) struct NarrowProfiles {
 impl NarrowProfiles {
     /// Computes the profiles of a spot at a place in a window of this size.
     ///
-    /// Part of the loop over the lobes, so that the processor computes several at once.
+    /// Part of the loop over the components, so that the processor computes several at once.
     #[inline(always)]
     pub fn fill(&mut self, [x_px, y_px]: [f64; 2], sigma_px: f64, size: Size) -> LitPart {
         /// Less than 10⁻⁵ of the light is beyond this many standard deviations of a pixel's edge.
@@ -225,11 +225,11 @@ fn fill(profile: &mut AxisProfile, center_px: f64, sigma_px: f64, count: usize) 
     }
 }
 
-/// The same as [`fill`] in single precision, for the lobes of a mixture: an error of 10⁻⁶ of a lobe's
+/// The same as [`fill`] in single precision, for the components of a mixture: an error of 10⁻⁶ of a component's
 /// light. The pixels that fill the last group are there as well, the last of them roughly.
 #[inline(always)]
 fn fill_narrow(profile: &mut AxisProfile, center_px: f64, cumulative: &Cumulative, count: usize) {
-    /// Pixels of nearly all lobes: two groups, whose edges take no decisions.
+    /// Pixels of nearly all components: two groups, whose edges take no decisions.
     const FEW: usize = 2 * GROUP_PX;
     let first_px = -0.5 - center_px as f32;
     if count < FEW {

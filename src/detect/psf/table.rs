@@ -1,10 +1,10 @@
 //! The effective PSF in a table: samples along both axes, several in a pixel, between which cubic
 //! B-splines interpolate.
 //!
-//! lobes → [`PsfTable`] → the light in each pixel of a window, and its derivatives.
+//! components → [`PsfTable`] → the light in each pixel of a window, and its derivatives.
 //!
 //! All pixels of a window are at the same fraction of a pixel from the nearest samples: they share
-//! the weights of the splines. The time that a window takes does not depend on how many lobes the
+//! the weights of the splines. The time that a window takes does not depend on how many components the
 //! PSF has.
 //!
 //! # Reference
@@ -20,7 +20,7 @@ use super::taps::{AxisTaps, PixelTaps, TAPS, TableLayout, fill_axes};
 use crate::base::size::Size;
 use multiversion::multiversion;
 
-/// Light of a lobe farther from its centre than this, in its standard deviations, is left out.
+/// Light of a component farther from its centre than this, in its standard deviations, is left out.
 const REACH_SIGMAS: f64 = 4.5;
 
 /// The fraction of the light in a group of pixels, and its derivatives with respect to x, y and
@@ -33,7 +33,7 @@ pub(crate) const LIGHT_BY_PLACE: usize = 3;
 /// or all.
 pub(crate) const LIGHT_BY_ALL: usize = 4;
 
-/// How sharp lobes are, and how far they reach.
+/// How sharp components are, and how far they reach.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ComponentExtent {
     least_px: f64,
@@ -41,7 +41,7 @@ pub(super) struct ComponentExtent {
 }
 
 impl Default for ComponentExtent {
-    /// Of no lobes.
+    /// Of no components.
     fn default() -> Self {
         Self {
             least_px: f64::INFINITY,
@@ -51,19 +51,19 @@ impl Default for ComponentExtent {
 }
 
 impl ComponentExtent {
-    /// Adds lobes.
-    pub fn add(&mut self, lobes: &[GaussianComponent]) {
-        for lobe in lobes {
-            let [dx, dy] = lobe.offset_px.map(f64::abs);
-            let reach_px = dx.max(dy) + REACH_SIGMAS * lobe.sigma_px + 0.5;
-            self.least_px = self.least_px.min(lobe.sigma_px);
+    /// Adds components.
+    pub fn add(&mut self, components: &[GaussianComponent]) {
+        for component in components {
+            let [dx, dy] = component.offset_px.map(f64::abs);
+            let reach_px = dx.max(dy) + REACH_SIGMAS * component.sigma_px + 0.5;
+            self.least_px = self.least_px.min(component.sigma_px);
             self.reach_px = self.reach_px.max(reach_px);
         }
     }
 
-    /// The layout that suits the lobes; `None` where they are too sharp for a table.
+    /// The layout that suits the components; `None` where they are too sharp for a table.
     pub fn layout(&self) -> Option<TableLayout> {
-        /// Of sharper lobes, in pixels, the derivative by the size is not known well enough.
+        /// Of sharper components, in pixels, the derivative by the size is not known well enough.
         const MIN_COMPONENT_PX: f64 = 0.4;
         let is_sharp = self.least_px < MIN_COMPONENT_PX;
         (!is_sharp).then(|| TableLayout::new(self.least_px, self.reach_px))
@@ -95,17 +95,22 @@ impl PsfTable {
         self.coefficients.clone_from(&other.coefficients);
     }
 
-    /// Tabulates lobes.
-    pub(super) fn fill(&mut self, lobes: &[GaussianComponent], layout: TableLayout) {
+    /// Tabulates components.
+    pub(super) fn fill(&mut self, components: &[GaussianComponent], layout: TableLayout) {
         self.layout = layout;
         self.coefficients.clear();
         self.coefficients.resize(layout.len(), 0.0);
         let mut profiles = [SplineProfile::default(), SplineProfile::default()];
-        for lobe in lobes {
-            for (profile, offset_px) in profiles.iter_mut().zip(lobe.offset_px) {
-                profile.fill(layout, offset_px, lobe.sigma_px);
+        for component in components {
+            for (profile, offset_px) in profiles.iter_mut().zip(component.offset_px) {
+                profile.fill(layout, offset_px, component.sigma_px);
             }
-            add_component_samples(layout, &profiles, lobe.share as f32, &mut self.coefficients);
+            add_component_samples(
+                layout,
+                &profiles,
+                component.share as f32,
+                &mut self.coefficients,
+            );
         }
     }
 
@@ -351,7 +356,7 @@ fn fractions_of<const PARTS: usize, const IS_SCALED: bool>(
     shares
 }
 
-/// Coefficients along one axis of a lobe.
+/// Coefficients along one axis of a component.
 #[derive(Debug, Clone, Default)]
 struct SplineProfile {
     /// Phase by phase, each in whole groups of pixels.
@@ -373,7 +378,7 @@ impl SplineProfile {
         1.0 / 36.0,
     ];
 
-    /// For a lobe this far from the spot's centre.
+    /// For a component this far from the spot's centre.
     fn fill(&mut self, layout: TableLayout, offset_px: f64, sigma_px: f64) {
         /// Samples on each side that the filter takes.
         const MARGIN: usize = SplineProfile::FILTER.len() / 2;
@@ -424,7 +429,7 @@ fn filter(edges: &[f32], per_px: usize, weights: &[f32; 5], into: &mut [f32]) {
     }
 }
 
-/// Adds a lobe to a table.
+/// Adds a component to a table.
 #[allow(
     clippy::needless_range_loop,
     reason = "rows of several arrays read best as indices"
@@ -463,24 +468,24 @@ pub(super) mod tests {
     /// Largest error of the light, and of its derivatives along an axis, over the light in the
     /// brightest pixel.
     const MAX_ERRORS: [f32; 3] = [2e-3, 2e-2, 2e-2];
-    /// Sizes of lobes, and the largest error of the derivative by the size, on which only flags
+    /// Sizes of components, and the largest error of the derivative by the size, on which only flags
     /// depend: its series in the width of the pixels has two terms.
     const SIZES: [(f64, f32); 3] = [(0.4, 0.2), (0.65, 0.06), (1.4, 0.03)];
 
     /// The same where the spot is scaled, and the pixels are not: their width is only in the light.
     const MAX_ERRORS_SCALED: [f32; 4] = [3e-2, 0.2, 0.2, 0.3];
 
-    /// A lopsided spot of lobes of this size.
+    /// A lopsided spot of components of this size.
     pub fn components(sigma_px: f64) -> Vec<GaussianComponent> {
         let offsets = [[-1.2, 0.1], [0.3, -0.6], [0.5, 0.4]];
         let shares = [0.25, 0.35, 0.4];
-        let lobe = |(offset, share): ([f64; 2], f64)| GaussianComponent {
+        let component = |(offset, share): ([f64; 2], f64)| GaussianComponent {
             offset_px: offset.map(|at| 2.0 * sigma_px * at),
             sigma_px,
             share,
         };
         let mut components: Vec<GaussianComponent> =
-            offsets.into_iter().zip(shares).map(lobe).collect();
+            offsets.into_iter().zip(shares).map(component).collect();
         for axis in 0..2 {
             let centre: f64 = components.iter().map(|l| l.share * l.offset_px[axis]).sum();
             components
@@ -490,7 +495,7 @@ pub(super) mod tests {
         components
     }
 
-    /// The light and its derivatives in a pixel of a window of this side, from the lobes.
+    /// The light and its derivatives in a pixel of a window of this side, from the components.
     fn expected(
         components: &[GaussianComponent],
         scale: f64,
@@ -500,9 +505,9 @@ pub(super) mod tests {
     ) -> [f64; 4] {
         let mut profiles = NarrowProfiles::default();
         let mut sums = [0.0; 4];
-        for lobe in components {
-            let at = [0, 1].map(|axis| place[axis] + lobe.offset_px[axis]);
-            let part = profiles.fill(at, lobe.sigma_px, Size::new(side, side));
+        for component in components {
+            let at = [0, 1].map(|axis| place[axis] + component.offset_px[axis]);
+            let part = profiles.fill(at, component.sigma_px, Size::new(side, side));
             let group = x / GROUP_PX;
             let is_lit = (part.rows[0]..part.rows[1]).contains(&y)
                 && (part.groups[0]..part.groups[1]).contains(&group);
@@ -518,11 +523,11 @@ pub(super) mod tests {
                 across.by_sigma * down.value + across.value * down.by_sigma,
             ]
             .map(f64::from);
-            let [dx, dy] = lobe.offset_px;
+            let [dx, dy] = component.offset_px;
             // By a size of which the scale is one.
-            let by_size = (by_x * dx + by_y * dy + by_sigma * lobe.sigma_px) / scale;
+            let by_size = (by_x * dx + by_y * dy + by_sigma * component.sigma_px) / scale;
             for (sum, part) in sums.iter_mut().zip([value, by_x, by_y, by_size]) {
-                *sum += lobe.share * part;
+                *sum += component.share * part;
             }
         }
         sums
@@ -543,22 +548,22 @@ pub(super) mod tests {
         }
     }
 
-    /// The table of lobes of a size agrees with the sum over them, `scale` times as large, up to
+    /// The table of components of a size agrees with the sum over them, `scale` times as large, up to
     /// these errors over the brightest pixel.
     fn assert_agreement(sigma_px: f64, scale: f64, most: [f32; 4]) {
         const SIDE: usize = 21;
-        let lobes = components(sigma_px);
+        let components = components(sigma_px);
         let mut table = PsfTable::default();
         table.fill(
-            &lobes,
+            &components,
             TableLayout::new(sigma_px, 4.0 * sigma_px + 7.0 * sigma_px),
         );
-        let scaled = |lobe: &GaussianComponent| GaussianComponent {
-            offset_px: lobe.offset_px.map(|at| scale * at),
-            sigma_px: scale * lobe.sigma_px,
-            ..*lobe
+        let scaled = |component: &GaussianComponent| GaussianComponent {
+            offset_px: component.offset_px.map(|at| scale * at),
+            sigma_px: scale * component.sigma_px,
+            ..*component
         };
-        let lobes: Vec<GaussianComponent> = lobes.iter().map(scaled).collect();
+        let components: Vec<GaussianComponent> = components.iter().map(scaled).collect();
         for place in [[10.0, 10.0], [9.63, 10.21], [10.5, 9.5], [2.2, 19.8]] {
             let groups = SIDE.div_ceil(GROUP_PX);
             let mut drawn = vec![[[0.0; GROUP_PX]; 4]; groups * SIDE];
@@ -571,7 +576,7 @@ pub(super) mod tests {
             );
             let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| [x, y]));
             let exact: Vec<_> = pixels
-                .map(|pixel| (pixel, expected(&lobes, scale, place, SIDE, pixel)))
+                .map(|pixel| (pixel, expected(&components, scale, place, SIDE, pixel)))
                 .collect();
             let brightest = exact.iter().fold(0.0f64, |most, (_, e)| most.max(e[0]));
             for ([x, y], exact) in exact {

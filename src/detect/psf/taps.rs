@@ -19,10 +19,10 @@ pub(super) struct TableLayout {
 }
 
 impl TableLayout {
-    /// For lobes of this size that reach this far from the centre, in pixels.
+    /// For components of this size that reach this far from the centre, in pixels.
     pub fn new(sigma_px: f64, reach_px: f64) -> Self {
-        /// Largest distance of the samples over the width of a lobe, pixel included: the error of
-        /// the interpolation is then below two thousandths of the lobe's peak.
+        /// Largest distance of the samples over the width of a component, pixel included: the error of
+        /// the interpolation is then below two thousandths of the component's peak.
         const MAX_STEP: f64 = 0.5;
         const MAX_PER_PX: usize = 6;
         let width_px = (sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();

@@ -383,15 +383,15 @@ fn components_of(model: &SpotModel, smear_px: [f64; 2]) -> usize {
 fn set_smear(model: &SpotModel, smear_px: [f64; 2], psf: &mut LocalPsf) {
     psf.spot_px = model.spot_sigma_px;
     psf.components.clear();
-    let lobes = components_of(model, smear_px);
-    for part in 0..lobes / 2 {
+    let components = components_of(model, smear_px);
+    for part in 0..components / 2 {
         for point in [-1.0, 1.0] {
             let within = 0.5 + 0.5 * point / 3f64.sqrt();
-            let along = 2.0 * (part as f64 + within) / lobes as f64 - 0.5;
+            let along = 2.0 * (part as f64 + within) / components as f64 - 0.5;
             psf.components.push(GaussianComponent {
                 offset_px: smear_px.map(|path_px| along * path_px),
                 sigma_px: model.spot_sigma_px,
-                share: 1.0 / lobes as f64,
+                share: 1.0 / components as f64,
             });
         }
     }

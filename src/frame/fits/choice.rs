@@ -25,19 +25,19 @@ impl<'a> ChosenFitsImage<'a> {
     pub fn of(
         bytes: &'a [u8],
         page: Option<NonZeroUsize>,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Self, FrameError> {
         match page {
-            Some(page) => Self::page(bytes, page, account),
-            None => Self::largest(bytes, account),
+            Some(page) => Self::page(bytes, page, budget),
+            None => Self::largest(bytes, budget),
         }
     }
 
-    fn page(bytes: &'a [u8], page: NonZeroUsize, account: &ReadBudget) -> Result<Self, FrameError> {
+    fn page(bytes: &'a [u8], page: NonZeroUsize, budget: &ReadBudget) -> Result<Self, FrameError> {
         let mut pages = 0;
         let mut units = Units::new(bytes);
         while let Some(unit) = units.next()? {
-            account.check_time()?;
+            budget.check_time()?;
             let plane = page.get() - 1 - pages;
             match unit.layout() {
                 Some(layout) if plane < layout.pages => {
@@ -58,13 +58,13 @@ impl<'a> ChosenFitsImage<'a> {
         })
     }
 
-    fn largest(bytes: &'a [u8], account: &ReadBudget) -> Result<Self, FrameError> {
+    fn largest(bytes: &'a [u8], budget: &ReadBudget) -> Result<Self, FrameError> {
         let mut pages = 0_usize;
         let mut first: Option<FitsLayout> = None;
         let mut best: Option<(FitsUnit, FitsLayout, usize)> = None;
         let mut units = Units::new(bytes);
         loop {
-            account.check_time()?;
+            budget.check_time()?;
             let unit = match units.next() {
                 Ok(Some(unit)) => unit,
                 Err(error) if best.is_none() => return Err(error),

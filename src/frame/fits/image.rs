@@ -29,7 +29,7 @@ impl<'a> FitsImage<'a> {
         unit: &FitsUnit,
         layout: FitsLayout,
         plane: Option<usize>,
-        account: &'a ReadBudget,
+        budget: &'a ReadBudget,
     ) -> Result<Self, FrameError> {
         if plane.is_none() && layout.is_cube() {
             let axes: Vec<String> = unit.axes.iter().map(usize::to_string).collect();
@@ -55,10 +55,10 @@ impl<'a> FitsImage<'a> {
             scale,
             zero: unit.header.number_or("BZERO", 0.0)?,
             blank: unit.blank().filter(|_| !unit.stored.is_float()),
-            budget: account,
+            budget,
         };
         let bytes_per_pixel = image.bytes_per_pixel(unit.is_compressed_image());
-        account.check_image(Size::new(width, height), bytes_per_pixel)?;
+        budget.check_image(Size::new(width, height), bytes_per_pixel)?;
         Ok(image)
     }
 

@@ -53,7 +53,7 @@ use unit::Units;
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Frame<'static>, FrameError> {
     let ChosenFitsImage {
         unit,
@@ -61,8 +61,8 @@ pub(super) fn decode(
         plane,
         image: choice,
         assumed,
-    } = ChosenFitsImage::of(bytes, page, account)?;
-    let image = FitsImage::new(&unit, layout, plane, account)?;
+    } = ChosenFitsImage::of(bytes, page, budget)?;
+    let image = FitsImage::new(&unit, layout, plane, budget)?;
     // The primary header holds the keywords that are common to all units.
     let (primary, _) = UnitHeader::parse(bytes, 0)?;
     let keywords = Keywords::new([&unit.header, &primary].into_iter());
@@ -71,7 +71,7 @@ pub(super) fn decode(
     metadata.choice = choice;
     metadata.assumed.extend(assumed);
     let mut frame = image.frame(&unit, bytes)?;
-    overscan::take(&mut frame, &keywords, &mut metadata, account)?;
+    overscan::take(&mut frame, &keywords, &mut metadata, budget)?;
     if let Some(stated) = keywords::saturation(&keywords) {
         stated.apply(&mut frame, &mut metadata);
     }
@@ -79,10 +79,10 @@ pub(super) fn decode(
 }
 
 /// The number of images in a FITS file, and why there may be more that cannot be found.
-pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<FrameError>) {
+pub(super) fn count_pages(bytes: &[u8], budget: &ReadBudget) -> (usize, Option<FrameError>) {
     let (mut pages, mut units) = (0_usize, Units::new(bytes));
     loop {
-        let unit = account.check_time().and_then(|()| units.next());
+        let unit = budget.check_time().and_then(|()| units.next());
         match unit {
             Ok(Some(unit)) => pages = pages.saturating_add(unit.pages()),
             Ok(None) => return (pages, None),

@@ -26,7 +26,7 @@ pub(super) fn take(
     frame: &mut Frame<'static>,
     keywords: &Keywords,
     metadata: &mut FrameMetadata,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<(), FrameError> {
     let Some(text) = keywords.text(KEYWORD) else {
         return Ok(());
@@ -35,7 +35,7 @@ pub(super) fn take(
         metadata.ignore(KEYWORD, &text, "[x1:x2,y1:y2], at most half of the image");
         return Ok(());
     };
-    account.check_image(frame.size(), size_of::<f32>())?;
+    budget.check_image(frame.size(), size_of::<f32>())?;
     let (width, step_adu) = (frame.width, f64::from(frame.step_adu));
     let pixels = frame.values_mut();
     let mut levels = Vec::new();

@@ -51,10 +51,10 @@ impl<'a> Chosen<'a> {
     /// first.
     /// # Errors
     /// As [`TiffFile::directories`], if there is no image before the error; [`FrameError::Interrupted`].
-    pub fn largest(file: TiffFile<'a>, account: &ReadBudget) -> Result<Self, FrameError> {
+    pub fn largest(file: TiffFile<'a>, budget: &ReadBudget) -> Result<Self, FrameError> {
         let mut candidates = Vec::new();
         for (number, page) in (1..).zip(file.directories()) {
-            account.check_time()?;
+            budget.check_time()?;
             let page = match page {
                 Ok(page) => page,
                 Err(error) if number == 1 => return Err(error),

@@ -31,25 +31,22 @@ impl Layout<'_> {
         source: ChunkSource<'a>,
         chunk: &Chunk,
     ) -> Result<StripRows<'a>, FrameError> {
-        let ChunkSource {
-            file,
-            budget: account,
-        } = source;
-        account.check_time()?;
+        let ChunkSource { file, budget } = source;
+        budget.check_time()?;
         let row_bytes = self.row_bytes();
         let wanted = row_bytes.saturating_mul(chunk.rows);
         let stored = self.stored(file, chunk, wanted as u64)?;
         if self.compression == Compression::Jpeg {
-            return self.jpeg(&stored, chunk, account);
+            return self.jpeg(&stored, chunk, budget);
         }
         let bytes = match self.compression {
             Compression::None | Compression::Jpeg => stored,
-            Compression::Lzw => lzw(&stored, wanted, account)?.into(),
-            Compression::Deflate => deflate(&stored, wanted, account)?.into(),
+            Compression::Lzw => lzw(&stored, wanted, budget)?.into(),
+            Compression::Deflate => deflate(&stored, wanted, budget)?.into(),
             Compression::PackBits => pack_bits(&stored, wanted).into(),
             Compression::Group4 => {
                 let size = Size::new(self.chunk_size.width, chunk.rows);
-                group_4(&stored, size, account)?.into()
+                group_4(&stored, size, budget)?.into()
             }
         };
         if bytes.len() < wanted {
@@ -89,15 +86,15 @@ impl Layout<'_> {
         &self,
         stored: &[u8],
         chunk: &Chunk,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<StripRows<'static>, FrameError> {
         let fail = |detail: String| {
-            account.why(malformed(format!("JPEG at byte {}: {detail}", chunk.place)))
+            budget.why(malformed(format!("JPEG at byte {}: {detail}", chunk.place)))
         };
         let bytes = self
             .whole_jpeg(stored)
             .ok_or_else(|| fail(format!("{} bytes without a start of image", stored.len())))?;
-        let jpeg = Jpeg::open(&bytes, account).map_err(|e| fail(e.to_string()))?;
+        let jpeg = Jpeg::open(&bytes, budget).map_err(|e| fail(e.to_string()))?;
         let (width, height, channels) = (jpeg.width, jpeg.height, jpeg.channels);
         let is_whole = width >= chunk.columns && height >= chunk.rows;
         let is_expected = width <= self.chunk_size.width && channels == self.chunk_samples;
@@ -113,9 +110,9 @@ impl Layout<'_> {
         }
         // Beside the copy of the file and the samples of the image.
         let held = (width * height * jpeg.bytes_per_pixel() + bytes.len()) as u64;
-        account.hold(held)?;
-        let pixels = jpeg.samples(account)?;
-        account.release(held);
+        budget.hold(held)?;
+        let pixels = jpeg.samples(budget)?;
+        budget.release(held);
         Ok(StripRows {
             bytes: pixels.into(),
             row_bytes: width * channels,
@@ -150,7 +147,7 @@ impl Layout<'_> {
 const BYTES_BETWEEN_CHECKS: usize = 1 << 16;
 
 /// At most `wanted` bytes of LZW.
-fn lzw(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
+fn lzw(stored: &[u8], wanted: usize, budget: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     use weezl::decode::Configuration;
     use weezl::{BitOrder, LzwStatus};
     let configuration = Configuration::with_tiff_size_switch(BitOrder::Msb, 8);
@@ -158,7 +155,7 @@ fn lzw(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, Fr
     let mut bytes = vec![0; wanted];
     let (mut read, mut written) = (0, 0);
     while written < wanted {
-        account.check_time()?;
+        budget.check_time()?;
         let end = wanted.min(written + BYTES_BETWEEN_CHECKS);
         let step = decoder.decode_bytes(&stored[read..], &mut bytes[written..end]);
         read += step.consumed_in;
@@ -174,13 +171,13 @@ fn lzw(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, Fr
 }
 
 /// At most `wanted` bytes of a zlib stream.
-fn deflate(stored: &[u8], wanted: usize, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
+fn deflate(stored: &[u8], wanted: usize, budget: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     let mut bytes = Vec::with_capacity(wanted);
-    let decoder = flate2::read::ZlibDecoder::new(account.timed(stored));
+    let decoder = flate2::read::ZlibDecoder::new(budget.timed(stored));
     match decoder.take(wanted as u64).read_to_end(&mut bytes) {
         // What is missing is reported by its length.
         Err(e) if e.kind() != std::io::ErrorKind::UnexpectedEof => {
-            Err(account.why(malformed(format!("deflate: {e}"))))
+            Err(budget.why(malformed(format!("deflate: {e}"))))
         }
         _ => Ok(bytes),
     }
@@ -216,7 +213,7 @@ fn pack_bits(mut stored: &[u8], wanted: usize) -> Vec<u8> {
 }
 
 /// Rows of one bit per pixel in CCITT group 4; black is 1, as libtiff has it.
-fn group_4(stored: &[u8], size: Size, account: &ReadBudget) -> Result<Vec<u8>, FrameError> {
+fn group_4(stored: &[u8], size: Size, budget: &ReadBudget) -> Result<Vec<u8>, FrameError> {
     use fax::Color::Black;
     use fax::decoder::{DecodeStatus, Group4Decoder, pels};
     let fail = |detail: String| malformed(format!("CCITT group 4: {detail}"));
@@ -229,7 +226,7 @@ fn group_4(stored: &[u8], size: Size, account: &ReadBudget) -> Result<Vec<u8>, F
     let mut decoder = Group4Decoder::new(input, width).map_err(|e| fail(e.to_string()))?;
     let mut bytes = Vec::with_capacity(rows * usize::from(width).div_ceil(8));
     for _ in 0..rows {
-        account.check_time()?;
+        budget.check_time()?;
         match decoder.advance().map_err(|e| fail(e.to_string()))? {
             DecodeStatus::End => break,
             DecodeStatus::Incomplete => {

@@ -39,17 +39,17 @@ pub use write::{TiffOptions, TiffSamples, write_tiff};
 pub(super) fn decode(
     bytes: &[u8],
     page: Option<NonZeroUsize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
     buffer: Vec<u16>,
 ) -> Result<Frame<'static>, FrameError> {
     let file = TiffFile::parse(bytes)?;
     let chosen = match page {
         Some(page) => Chosen::page(file, page)?,
-        None => Chosen::largest(file, account)?,
+        None => Chosen::largest(file, budget)?,
     };
     let layout = Layout::parse(&chosen.directory)?;
     let size = Size::new(layout.width, layout.height);
-    account.check_image(size, layout.bytes_per_pixel())?;
+    budget.check_image(size, layout.bytes_per_pixel())?;
     let frame = match layout.plain_words() {
         Some((start, length)) => {
             let words = file.range(start, length)?.as_chunks().0;
@@ -57,10 +57,7 @@ pub(super) fn decode(
         }
         None => {
             drop(buffer);
-            layout.frame(ChunkSource {
-                file,
-                budget: account,
-            })
+            layout.frame(ChunkSource { file, budget })
         }
     };
     let mut metadata = exif::metadata(bytes, layout.width);
@@ -71,14 +68,14 @@ pub(super) fn decode(
 
 /// The number of images in a TIFF file, at most [`MAX_PAGES`], and why there may be more that cannot
 /// be found.
-pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<FrameError>) {
+pub(super) fn count_pages(bytes: &[u8], budget: &ReadBudget) -> (usize, Option<FrameError>) {
     let file = match TiffFile::parse(bytes) {
         Ok(file) => file,
         Err(error) => return (0, Some(error)),
     };
     let mut pages = 0;
     for directory in file.directories().take(MAX_PAGES) {
-        if let Err(error) = directory.and_then(|_| account.check_time()) {
+        if let Err(error) = directory.and_then(|_| budget.check_time()) {
             return (pages, Some(error));
         }
         pages += 1;
@@ -88,46 +85,46 @@ pub(super) fn count_pages(bytes: &[u8], account: &ReadBudget) -> (usize, Option<
 
 impl Layout<'_> {
     fn frame(&self, source: ChunkSource) -> Result<Frame<'static>, FrameError> {
-        let account = source.budget;
+        let budget = source.budget;
         let full = self.depth.full_scale();
         // Values of more than 24 bits are rounded.
-        let rounded = |values: Vec<f32>| Ok(self.floats(values, account)?.with_levels(1.0, None));
+        let rounded = |values: Vec<f32>| Ok(self.floats(values, budget)?.with_levels(1.0, None));
         match (self.depth.format, self.depth.bits) {
             (SampleFormat::Unsigned, ..=8) => {
-                self.integers(&self.samples::<u8>(source)?, full as u8, account)
+                self.integers(&self.samples::<u8>(source)?, full as u8, budget)
             }
             (SampleFormat::Unsigned, ..=16) => {
-                self.integers(&self.samples::<u16>(source)?, full as u16, account)
+                self.integers(&self.samples::<u16>(source)?, full as u16, budget)
             }
             (SampleFormat::Unsigned, ..=32) => {
-                self.integers(&self.samples::<u32>(source)?, full as u32, account)
+                self.integers(&self.samples::<u32>(source)?, full as u32, budget)
             }
             (SampleFormat::Unsigned, _) => rounded(self.samples_as(source, |v: u64| v as f32)?),
             (SampleFormat::Signed, ..=8) => {
-                self.integers(&self.samples_as(source, |v: u8| v as i8)?, i8::MAX, account)
+                self.integers(&self.samples_as(source, |v: u8| v as i8)?, i8::MAX, budget)
             }
             (SampleFormat::Signed, ..=16) => self.integers(
                 &self.samples_as(source, |v: u16| v as i16)?,
                 i16::MAX,
-                account,
+                budget,
             ),
             (SampleFormat::Signed, ..=32) => self.integers(
                 &self.samples_as(source, |v: u32| v as i32)?,
                 i32::MAX,
-                account,
+                budget,
             ),
             (SampleFormat::Signed, _) => {
                 rounded(self.samples_as(source, |v: u64| v as i64 as f32)?)
             }
             (SampleFormat::Float, ..=16) => {
-                self.floats(self.samples_as(source, float_of_half)?, account)
+                self.floats(self.samples_as(source, float_of_half)?, budget)
             }
             (SampleFormat::Float, ..=32) => {
-                self.floats(self.samples_as(source, f32::from_bits)?, account)
+                self.floats(self.samples_as(source, f32::from_bits)?, budget)
             }
             (SampleFormat::Float, _) => self.floats(
                 self.samples_as(source, |v: u64| f64::from_bits(v) as f32)?,
-                account,
+                budget,
             ),
         }
     }
@@ -145,7 +142,7 @@ impl Layout<'_> {
         &self,
         values: &[T],
         full_scale: T,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         let samples = LevelSamples {
             width: self.width,
@@ -153,19 +150,19 @@ impl Layout<'_> {
             values,
             channels: self.channels,
         };
-        frame_from_integers(&samples, full_scale, account)
+        frame_from_integers(&samples, full_scale, budget)
     }
 
     fn floats(
         &self,
         mut values: Vec<f32>,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Frame<'static>, FrameError> {
         if self.color == Color::WhiteIsZero {
             values.iter_mut().for_each(|value| *value = 1.0 - *value);
         }
         let size = Size::new(self.width, self.height);
-        frame_from_floats(size, self.channels, values, account)
+        frame_from_floats(size, self.channels, values, budget)
     }
 }
 

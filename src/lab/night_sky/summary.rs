@@ -266,18 +266,18 @@ fn rounded(mag: f64) -> f64 {
 
 /// The area under the curve of true over false positives; `None` without cells of both kinds.
 fn area_under_curve<'a>(cells: impl Iterator<Item = &'a TrialCellRow>) -> Option<f64> {
-    let told = cells.filter_map(|cell| {
+    let ranked = cells.filter_map(|cell| {
         let is_clouded = cell.true_clouds_mag > CLOUDED_MAG;
         let is_either = is_clouded || cell.true_clouds_mag < UNCLOUDED_MAG;
         Some((1.0 - cell.clear?, is_clouded)).filter(|_| is_either)
     });
-    let mut told: Vec<(f64, bool)> = told.collect();
-    told.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let clouded = told.iter().filter(|(_, is_clouded)| *is_clouded).count() as f64;
-    let pairs = clouded * (told.len() as f64 - clouded);
+    let mut ranked: Vec<(f64, bool)> = ranked.collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let clouded = ranked.iter().filter(|(_, is_clouded)| *is_clouded).count() as f64;
+    let pairs = clouded * (ranked.len() as f64 - clouded);
     let (mut below, mut right_pairs) = (0.0, 0.0);
     // Of equal probabilities half of the pairs count.
-    for equal in told.chunk_by(|a, b| a.0 == b.0) {
+    for equal in ranked.chunk_by(|a, b| a.0 == b.0) {
         let here = equal.iter().filter(|(_, is_clouded)| *is_clouded).count() as f64;
         let others = equal.len() as f64 - here;
         right_pairs += here * (below + 0.5 * others);
@@ -289,11 +289,11 @@ fn area_under_curve<'a>(cells: impl Iterator<Item = &'a TrialCellRow>) -> Option
 impl ClearTenth {
     fn of(tenth: usize, trials: &[SkyTrial]) -> Option<Self> {
         let cells = trials.iter().flat_map(|trial| &trial.cells);
-        let told = cells.filter_map(|cell| Some((cell.clear?, cell)));
+        let ranked = cells.filter_map(|cell| Some((cell.clear?, cell)));
         let is_inside = |(clear, _): &(f64, &TrialCellRow)| {
             ((clear * TENTHS as f64) as usize).min(TENTHS - 1) == tenth
         };
-        let inside: Vec<(f64, &TrialCellRow)> = told.filter(is_inside).collect();
+        let inside: Vec<(f64, &TrialCellRow)> = ranked.filter(is_inside).collect();
         let cells = inside.len();
         let mean = |of: &dyn Fn(f64, &TrialCellRow) -> f64| {
             let sum: f64 = inside.iter().map(|(clear, cell)| of(*clear, cell)).sum();

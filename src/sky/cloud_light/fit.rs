@@ -150,7 +150,7 @@ impl CloudLightFit {
     /// What stars and light tell of a cell.
     fn expected(&self, lit: &LitCell) -> ExpectedCloud {
         let excess = self.excess(lit);
-        let [mut all, mut cloud, mut told, mut first, mut second] = [0.0; 5];
+        let [mut all, mut cloud, mut true_sum, mut first, mut second] = [0.0; 5];
         for step in 0..=STEPS {
             let share = fraction_of(step);
             let light = self.likelihood(excess, share);
@@ -158,22 +158,22 @@ impl CloudLightFit {
             let true_part = Self::true_part(light);
             all += both;
             cloud += self.clouded * lit.hidden.cloud[step] * light;
-            told += both * true_part;
+            true_sum += both * true_part;
             first += both * true_part * share;
             second += both * true_part * share * share;
         }
         let cloud = cloud / all;
-        if told < f64::EPSILON * all {
+        if true_sum < f64::EPSILON * all {
             return ExpectedCloud {
                 cloud,
                 ..ExpectedCloud::default()
             };
         }
-        let share = first / told;
+        let share = first / true_sum;
         ExpectedCloud {
             fraction: share,
-            fraction_variance: (second / told - share * share).max(0.0),
-            weight: told / all,
+            fraction_variance: (second / true_sum - share * share).max(0.0),
+            weight: true_sum / all,
             cloud,
         }
     }
@@ -225,22 +225,22 @@ impl CloudLightFit {
     /// light tells of clouds, than if it were clear.
     pub(super) fn gains(&self, lit: &LitCell, before: &Hidden, clouded: f64) -> [f64; 3] {
         let excess = self.excess(lit);
-        let [mut foretold, mut light_all, mut cloudy] = [0.0; 3];
+        let [mut predicted, mut light_all, mut cloudy] = [0.0; 3];
         let [mut by_part, mut by_part_here, mut if_clear] = [0.0; 3];
         for step in 0..=STEPS {
             let light = self.likelihood(excess, fraction_of(step));
-            foretold += light * lit.hidden.mixed(step, self.clouded);
+            predicted += light * lit.hidden.mixed(step, self.clouded);
             light_all += light * before.mixed(step, self.clouded);
             cloudy += light * self.clouded * before.cloud[step];
             by_part += lit.hidden.mixed(step, clouded);
             by_part_here += lit.hidden.mixed(step, self.clouded);
             if_clear += lit.hidden.clear[step];
         }
-        let foretold = libm::log(foretold / light_all);
+        let predicted = libm::log(predicted / light_all);
         [
-            foretold - libm::log(by_part),
-            foretold - libm::log(by_part_here),
-            cloudy / light_all * (foretold - libm::log(if_clear)),
+            predicted - libm::log(by_part),
+            predicted - libm::log(by_part_here),
+            cloudy / light_all * (predicted - libm::log(if_clear)),
         ]
     }
 }

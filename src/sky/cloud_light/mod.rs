@@ -43,8 +43,8 @@ impl CloudLight {
                 std::array::from_fn(|i| sum[i] + gains[i])
             });
         // Neighbours share stars.
-        let is_told = |gain: f64| gain > MIN_GAIN * CELLS_OF_A_STAR;
-        if !gains.into_iter().all(is_told) {
+        let is_significant = |gain: f64| gain > MIN_GAIN * CELLS_OF_A_STAR;
+        if !gains.into_iter().all(is_significant) {
             return None;
         }
         fit.set_light_by_stars(&cells);
@@ -92,11 +92,11 @@ mod tests {
                 let along = (cell * 7 % CELLS) as f64 / CELLS as f64;
                 let clear = 1.0 + 0.5 * along + 0.005 * random.random_range(-1.0..1.0);
                 let added = if is_cloudy { 0.5 * of_cloud } else { 0.0 };
-                let told_cloudy = is_cloudy != random.random_bool(wrong);
+                let seen_cloudy = is_cloudy != random.random_bool(wrong);
                 let by_stars = for_each_fraction(|share| {
                     let near = (share - 0.5).abs() < 0.2;
-                    let is_untold = cell % 2 == 1;
-                    if is_untold || near == told_cloudy {
+                    let is_unseen = cell % 2 == 1;
+                    if is_unseen || near == seen_cloudy {
                         1.0
                     } else {
                         0.02

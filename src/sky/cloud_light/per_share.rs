@@ -78,9 +78,9 @@ impl CloudyCell<'_> {
         });
         // The weights of all steps, also of shares that there are not: of these no star tells.
         let all = width * STEPS as f64 * TAU.sqrt();
-        let foretold: f64 = weighted.sum();
+        let predicted: f64 = weighted.sum();
         let any = self.lit.by_stars.iter().sum::<f64>() / (STEPS + 1) as f64;
-        (1.0 - UNTRUE) * foretold / all + UNTRUE * any
+        (1.0 - UNTRUE) * predicted / all + UNTRUE * any
     }
 }
 
@@ -112,11 +112,14 @@ mod tests {
             CloudLightRatio::of(&cells.collect::<Vec<_>>())
         };
         // They take half of what their light was thought to tell: it is twice as much for what they take.
-        let well_told = found(0.05, 40);
-        assert!((well_told.ln_ratio - 0.69).abs() < 0.05, "{well_told:?}");
-        assert!(well_told.sigma < 0.05, "{well_told:?}");
-        let untold = found(10.0, 40);
+        let well_measured = found(0.05, 40);
+        assert!(
+            (well_measured.ln_ratio - 0.69).abs() < 0.05,
+            "{well_measured:?}"
+        );
+        assert!(well_measured.sigma < 0.05, "{well_measured:?}");
+        let poorly_measured = found(10.0, 40);
         // Shares above one are ruled out, and nothing else.
-        assert!(untold.sigma > 0.4, "{untold:?}");
+        assert!(poorly_measured.sigma > 0.4, "{poorly_measured:?}");
     }
 }

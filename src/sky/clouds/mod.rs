@@ -60,71 +60,80 @@ pub(super) struct CloudMap {
 
 impl CloudInputs<'_> {
     /// Clouds in each cell.
-    pub(super) fn clouds(&self, witnesses: &[CellStar], levels: &SkyLevels) -> CloudMap {
+    pub(super) fn clouds(&self, cell_stars: &[CellStar], levels: &SkyLevels) -> CloudMap {
         let limit = if self.is_usual {
             Some(RelativeLimit::usual())
         } else {
-            RelativeLimit::of_clear_sky(witnesses, self.clear_sky, self.chance)
+            RelativeLimit::of_clear_sky(cell_stars, self.clear_sky, self.chance)
         };
-        let logs: Vec<Cases> = witnesses
+        let logs: Vec<Cases> = cell_stars
             .iter()
-            .map(|witness| self.ln_likelihoods(witness, limit.as_ref()))
+            .map(|cell_star| self.ln_likelihoods(cell_star, limit.as_ref()))
             .collect();
         let mut cells = vec![CellClouds::default(); self.grid.places.len()];
-        let mut told = Vec::new();
+        let mut likelihoods = Vec::new();
         let mut stars_of = vec![0.0; cells.len()];
         for (cell, (clouds, level)) in cells.iter_mut().zip(&levels.cells).enumerate() {
             let solid_angle_sr = level.solid_angle_sr;
-            let stars = witnesses.iter().zip(&logs);
+            let stars = cell_stars.iter().zip(&logs);
             let around = self.around(cell, stars, limit.as_ref(), clouds);
             if let Some(around) = around.filter(|_| solid_angle_sr > 0.0) {
                 stars_of[cell] = around.stars;
-                told.push(CellLikelihoods::new(
+                likelihoods.push(CellLikelihoods::new(
                     cell,
                     solid_angle_sr,
                     &around.ln_likelihoods,
                 ));
             }
         }
-        let mut belief = CloudPosterior::of(&told);
+        let mut posterior = CloudPosterior::of(&likelihoods);
         let shares = hidden_fractions();
-        let lit = told
-            .iter()
-            .filter_map(|told| self.lit(told, levels, belief.hidden(told, &shares)));
-        let before = belief.hidden_before(&shares);
-        if let Some(light) = CloudLight::measure(lit.collect(), &before, belief.clouded) {
-            for told in &mut told {
-                let cell = told.cell;
-                told.add(&shares, |share| light.likelihood(cell, share));
+        let lit = likelihoods.iter().filter_map(|likelihoods| {
+            self.lit(likelihoods, levels, posterior.hidden(likelihoods, &shares))
+        });
+        let before = posterior.hidden_before(&shares);
+        if let Some(light) = CloudLight::measure(lit.collect(), &before, posterior.clouded) {
+            for likelihoods in &mut likelihoods {
+                let cell = likelihoods.cell;
+                likelihoods.add(&shares, |share| light.likelihood(cell, share));
             }
-            belief = CloudPosterior::of(&told);
+            posterior = CloudPosterior::of(&likelihoods);
         }
-        for (told, (clear, extinction_mag)) in told.iter().zip(belief.cells()) {
-            cells[told.cell].clear = Some(clear);
-            cells[told.cell].extinction_mag = Some(extinction_mag);
+        for (likelihoods, (clear, extinction_mag)) in likelihoods.iter().zip(posterior.cells()) {
+            cells[likelihoods.cell].clear = Some(clear);
+            cells[likelihoods.cell].extinction_mag = Some(extinction_mag);
         }
-        let texture = Texture::measure(self, witnesses);
-        let doubts_mag: Vec<f64> = told
+        let texture = Texture::measure(self, cell_stars);
+        let doubts_mag: Vec<f64> = likelihoods
             .iter()
-            .map(|told| self.doubt_mag(told.cell, &cells, stars_of[told.cell], levels, &texture))
+            .map(|likelihoods| {
+                self.doubt_mag(
+                    likelihoods.cell,
+                    &cells,
+                    stars_of[likelihoods.cell],
+                    levels,
+                    &texture,
+                )
+            })
             .collect();
-        for (told, doubt_mag) in told.iter().zip(doubts_mag) {
-            let clouds = &mut cells[told.cell];
+        for (likelihoods, doubt_mag) in likelihoods.iter().zip(doubts_mag) {
+            let clouds = &mut cells[likelihoods.cell];
             if let Some(extinction_mag) = &mut clouds.extinction_mag {
                 extinction_mag.sigma = libm::hypot(extinction_mag.sigma, doubt_mag);
             }
-            let [low, high] = belief.clear_band(told, libm::hypot(doubt_mag, CLEAR_SIGMA_MAG));
+            let [low, high] =
+                posterior.clear_band(likelihoods, libm::hypot(doubt_mag, CLEAR_SIGMA_MAG));
             clouds.clear_band = clouds.clear.map(|clear| [low.min(clear), high.max(clear)]);
         }
-        let bands = |told: &CellLikelihoods| {
+        let bands = |likelihoods: &CellLikelihoods| {
             let CellClouds {
                 clear, clear_band, ..
-            } = cells[told.cell];
+            } = cells[likelihoods.cell];
             let [low, high] = clear_band.unwrap_or([0.0, 1.0]);
             [low, clear.unwrap_or(0.5), high]
         };
         CloudMap {
-            fraction: belief.fraction(&told, bands),
+            fraction: posterior.fraction(&likelihoods, bands),
             cells,
         }
     }
@@ -161,49 +170,54 @@ impl CloudInputs<'_> {
         clouds: &mut CellClouds,
     ) -> Option<Around> {
         let mut total = [0.0; CASES];
-        let [mut told, mut squares] = [0.0; 2];
-        for (witness, logs) in stars {
-            let Some(weight) = self.grid.weight(cell, &witness.star.direction) else {
+        let [mut weights, mut squares] = [0.0; 2];
+        for (cell_star, logs) in stars {
+            let Some(weight) = self.grid.weight(cell, &cell_star.star.direction) else {
                 continue;
             };
             for (total, log) in total.iter_mut().zip(logs) {
                 *total += weight * log;
             }
             let is_expected =
-                limit.is_some_and(|limit| limit.probability(witness.relative_mag) > EXPECTED);
-            if is_expected || witness.star.measured.is_some() {
-                told += weight;
+                limit.is_some_and(|limit| limit.probability(cell_star.relative_mag) > EXPECTED);
+            if is_expected || cell_star.star.measured.is_some() {
+                weights += weight;
                 squares += weight * weight;
             }
-            if witness.cell == cell && is_expected {
+            if cell_star.cell == cell && is_expected {
                 clouds.expected += 1;
-                clouds.detected += usize::from(witness.star.is_detected);
+                clouds.detected += usize::from(cell_star.star.is_detected);
             }
         }
-        let is_told = told > MIN_WEIGHT && self.depths[cell].is_some();
-        is_told.then(|| Around {
+        let is_measured = weights > MIN_WEIGHT && self.depths[cell].is_some();
+        is_measured.then(|| Around {
             ln_likelihoods: total,
-            stars: told * told / squares,
+            stars: weights * weights / squares,
         })
     }
 
     /// A cell with its light.
-    fn lit(&self, told: &CellLikelihoods, levels: &SkyLevels, hidden: Hidden) -> Option<LitCell> {
-        let place = self.grid.pixel_of(told.cell)?;
+    fn lit(
+        &self,
+        likelihoods: &CellLikelihoods,
+        levels: &SkyLevels,
+        hidden: Hidden,
+    ) -> Option<LitCell> {
+        let place = self.grid.pixel_of(likelihoods.cell)?;
         let direction = self.grid.direction_of(&place)?;
         let (camera, zenith) = (self.grid.camera(), self.frame.places.zenith());
         Some(LitCell {
-            cell: told.cell,
+            cell: likelihoods.cell,
             hidden,
-            by_stars: for_each_fraction(|share| told.likelihood_of(share)),
-            light: levels.radiance_adu_sr(told.cell)?,
+            by_stars: for_each_fraction(|share| likelihoods.likelihood_of(share)),
+            light: levels.radiance_adu_sr(likelihoods.cell)?,
             terms: terms(camera, &place, &direction, zenith, self.moon.as_ref()),
         })
     }
 
     /// The logarithm of the likelihood of a star in each case.
-    fn ln_likelihoods(&self, witness: &CellStar, limit: Option<&RelativeLimit>) -> Cases {
-        let full = self.likelihoods(witness, limit);
+    fn ln_likelihoods(&self, cell_star: &CellStar, limit: Option<&RelativeLimit>) -> Cases {
+        let full = self.likelihoods(cell_star, limit);
         std::array::from_fn(|case| {
             let CloudCase { cover, mag, .. } = cases::case(case);
             let behind = full[(mag / STEP_MAG).round() as usize];
@@ -214,13 +228,13 @@ impl CloudInputs<'_> {
     }
 
     /// The likelihood of a star for each extinction.
-    fn likelihoods(&self, witness: &CellStar, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
-        let star = witness.star;
+    fn likelihoods(&self, cell_star: &CellStar, limit: Option<&RelativeLimit>) -> [f64; STEPS] {
+        let star = cell_star.star;
         let dimmed_by = self.clear_sky.dimmed_by(star);
         std::array::from_fn(|step| {
             let extinction_mag = step as f64 * STEP_MAG;
             let seen = limit.map_or(1.0, |limit| {
-                limit.probability(witness.relative_mag + extinction_mag)
+                limit.probability(cell_star.relative_mag + extinction_mag)
             });
             let seen = UNTRUE + (1.0 - 2.0 * UNTRUE) * seen;
             match (dimmed_by, star.is_detected) {

@@ -32,7 +32,7 @@ pub(super) struct CellLikelihoods {
     /// Solid angle of its sky.
     pub solid_angle_sr: f64,
     /// Likelihoods of the cases, over the largest.
-    likelihoods: Cases,
+    by_case: Cases,
 }
 
 impl CellLikelihoods {
@@ -45,7 +45,7 @@ impl CellLikelihoods {
         Self {
             cell,
             solid_angle_sr,
-            likelihoods: ln_likelihoods.map(|ln| libm::exp(ln - largest)),
+            by_case: ln_likelihoods.map(|ln| libm::exp(ln - largest)),
         }
     }
 
@@ -54,19 +54,19 @@ impl CellLikelihoods {
         const THICKEST: f64 = (STEPS - 1) as f64;
         let mag = -2.5 * libm::log10(1.0 - share);
         let case = (mag / STEP_MAG).min(THICKEST);
-        let [below, above] = [case.floor(), case.ceil()].map(|at| self.likelihoods[at as usize]);
+        let [below, above] = [case.floor(), case.ceil()].map(|at| self.by_case[at as usize]);
         below + case.fract() * (above - below)
     }
 
     /// Adds what else tells of it, by the share of a star's light that clouds take; `hidden_shares` are those of
     /// the cases.
     pub(super) fn add(&mut self, hidden_shares: &Cases, likelihood: impl Fn(f64) -> f64) {
-        for (likelihood_of_case, share) in self.likelihoods.iter_mut().zip(hidden_shares) {
+        for (likelihood_of_case, share) in self.by_case.iter_mut().zip(hidden_shares) {
             *likelihood_of_case *= likelihood(*share);
         }
-        let largest = self.likelihoods.iter().copied().fold(0.0, f64::max);
+        let largest = self.by_case.iter().copied().fold(0.0, f64::max);
         if largest > 0.0 {
-            for likelihood in &mut self.likelihoods {
+            for likelihood in &mut self.by_case {
                 *likelihood /= largest;
             }
         }
@@ -89,9 +89,9 @@ pub(super) struct CloudPosterior {
 
 impl CloudPosterior {
     /// With the mean extinction of clouds that is likeliest.
-    pub(super) fn of(told: &[CellLikelihoods]) -> Self {
-        let beliefs = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(told, mean_mag));
-        let [first, rest @ ..] = beliefs;
+    pub(super) fn of(likelihoods: &[CellLikelihoods]) -> Self {
+        let posteriors = MEAN_CLOUDS_MAG.map(|mean_mag| Self::with(likelihoods, mean_mag));
+        let [first, rest @ ..] = posteriors;
         let likelier = |best: Self, other: Self| {
             if other.ln_likelihood() > best.ln_likelihood() {
                 other
@@ -103,27 +103,31 @@ impl CloudPosterior {
     }
 
     /// The part that is clouded is the one for which what the cells show is most probable.
-    fn with(told: &[CellLikelihoods], mean_cloud_mag: f64) -> Self {
+    fn with(likelihoods: &[CellLikelihoods], mean_cloud_mag: f64) -> Self {
         const STEPS: usize = 200;
         /// Cells that are clear, and that are not, which the sky has beforehand.
         const BEFOREHAND: f64 = 0.5;
         let priors = CasePriors::new(mean_cloud_mag, &USUAL);
-        let evidence: Vec<Evidence> = told
+        let evidence: Vec<Evidence> = likelihoods
             .iter()
-            .map(|told| priors.evidence(told, CLEAR_MAG))
+            .map(|likelihoods| priors.evidence(likelihoods, CLEAR_MAG))
             .collect();
-        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        let all_sr: f64 = likelihoods
+            .iter()
+            .map(|likelihoods| likelihoods.solid_angle_sr)
+            .sum();
         // The same stars tell of several cells.
-        let cells = told.len() as f64 / CELLS_OF_A_STAR;
+        let cells = likelihoods.len() as f64 / CELLS_OF_A_STAR;
         let mean = |of: &dyn Fn(&Evidence) -> f64| {
-            let parts = told.iter().zip(&evidence);
-            let parts = parts.map(|(told, evidence)| told.solid_angle_sr / all_sr * of(evidence));
+            let parts = likelihoods.iter().zip(&evidence);
+            let parts = parts
+                .map(|(likelihoods, evidence)| likelihoods.solid_angle_sr / all_sr * of(evidence));
             parts.sum::<f64>()
         };
         let mut clouded = 0.5;
         for _ in 0..STEPS {
             let share = mean(&|of| clouded * of.cloud.all / of.mixed(clouded));
-            let share = if told.is_empty() { 0.5 } else { share };
+            let share = if likelihoods.is_empty() { 0.5 } else { share };
             clouded = (BEFOREHAND + cells * share) / (2.0 * BEFOREHAND + cells);
         }
         let information = mean(&|of| ((of.cloud.all - of.clear.all) / of.mixed(clouded)).powi(2));
@@ -142,8 +146,8 @@ impl CloudPosterior {
     }
 
     /// The share of a star's light that clouds take in a cell; `hidden_shares` are those of the cases.
-    pub(super) fn hidden(&self, told: &CellLikelihoods, hidden_shares: &Cases) -> Hidden {
-        self.priors.hidden(&told.likelihoods, hidden_shares)
+    pub(super) fn hidden(&self, likelihoods: &CellLikelihoods, hidden_shares: &Cases) -> Hidden {
+        self.priors.hidden(&likelihoods.by_case, hidden_shares)
     }
 
     /// The same of a cell of which nothing is told.
@@ -159,9 +163,11 @@ impl CloudPosterior {
 
     /// The probability of a cell that it is clear where clouds are smooth and thicker by `doubt_mag`, and where they
     /// are broken and thinner by that.
-    pub(super) fn clear_band(&self, told: &CellLikelihoods, doubt_mag: f64) -> [f64; 2] {
+    pub(super) fn clear_band(&self, likelihoods: &CellLikelihoods, doubt_mag: f64) -> [f64; 2] {
         let clear = |priors: &CasePriors, clear_mag: f64| {
-            let (clear, _) = priors.evidence(told, clear_mag).posterior(self.clouded);
+            let (clear, _) = priors
+                .evidence(likelihoods, clear_mag)
+                .posterior(self.clouded);
             clear
         };
         let [smooth, broken] = &self.limiting;
@@ -175,16 +181,19 @@ impl CloudPosterior {
     /// their bands.
     pub(super) fn fraction(
         &self,
-        told: &[CellLikelihoods],
+        likelihoods: &[CellLikelihoods],
         clear: impl Fn(&CellLikelihoods) -> [f64; 3],
     ) -> Option<Estimate> {
         /// The ends of all bands together, over the standard error that they are.
         const BAND_SIGMAS: f64 = 2.0;
-        let all_sr: f64 = told.iter().map(|told| told.solid_angle_sr).sum();
+        let all_sr: f64 = likelihoods
+            .iter()
+            .map(|likelihoods| likelihoods.solid_angle_sr)
+            .sum();
         let [mut clouded, mut band] = [0.0; 2];
-        for told in told {
-            let weight = told.solid_angle_sr / all_sr;
-            let [low, clear, high] = clear(told);
+        for likelihoods in likelihoods {
+            let weight = likelihoods.solid_angle_sr / all_sr;
+            let [low, clear, high] = clear(likelihoods);
             clouded += weight * (1.0 - clear);
             band += weight * (high - low);
         }
@@ -225,10 +234,10 @@ impl CasePriors {
     }
 
     /// What is told of a cell, where less than `clear_mag` counts as clear.
-    fn evidence(&self, told: &CellLikelihoods, clear_mag: f64) -> Evidence {
+    fn evidence(&self, likelihoods: &CellLikelihoods, clear_mag: f64) -> Evidence {
         let sums = |prior: &Cases| {
             let mut sums = CaseSums::default();
-            for (case, (likelihood, prior)) in told.likelihoods.iter().zip(prior).enumerate() {
+            for (case, (likelihood, prior)) in likelihoods.by_case.iter().zip(prior).enumerate() {
                 let weight = prior * likelihood;
                 sums.all += weight;
                 sums.first += weight * mean_mag(case);
@@ -246,9 +255,9 @@ impl CasePriors {
         evidence
     }
 
-    fn hidden(&self, likelihoods: &Cases, hidden_shares: &Cases) -> Hidden {
+    fn hidden(&self, by_case: &Cases, hidden_shares: &Cases) -> Hidden {
         let mut hidden = Hidden::NONE;
-        for (case, likelihood) in likelihoods.iter().enumerate() {
+        for (case, likelihood) in by_case.iter().enumerate() {
             let [clear, cloud] = [&self.clear, &self.cloud].map(|prior| prior[case] * likelihood);
             hidden.add(hidden_shares[case], clear, cloud);
         }
@@ -324,14 +333,16 @@ mod tests {
         CellLikelihoods::new(cell, 0.01, &logs)
     }
 
-    fn fraction_of(belief: &CloudPosterior, all: &[CellLikelihoods]) -> Option<Estimate> {
-        let clear: Vec<f64> = belief.cells().map(|(clear, _)| clear).collect();
-        let bands = all.iter().map(|told| belief.clear_band(told, 0.05));
+    fn fraction_of(posterior: &CloudPosterior, all: &[CellLikelihoods]) -> Option<Estimate> {
+        let clear: Vec<f64> = posterior.cells().map(|(clear, _)| clear).collect();
+        let bands = all
+            .iter()
+            .map(|likelihoods| posterior.clear_band(likelihoods, 0.05));
         let bands: Vec<[f64; 2]> = bands.collect();
-        belief.fraction(all, |told| {
+        posterior.fraction(all, |likelihoods| {
             let at = all
                 .iter()
-                .position(|other| other.cell == told.cell)
+                .position(|other| other.cell == likelihoods.cell)
                 .unwrap();
             [bands[at][0], clear[at], bands[at][1]]
         })
@@ -342,12 +353,12 @@ mod tests {
         let cells: Vec<CellLikelihoods> = (0..100)
             .map(|cell| evidence(cell, 0.3, if cell < 50 { 1e-3 } else { 1e4 }))
             .collect();
-        let belief = CloudPosterior::of(&cells);
-        for (told, (clear, _)) in cells.iter().zip(belief.cells()) {
-            let [low, high] = belief.clear_band(told, 0.05);
+        let posterior = CloudPosterior::of(&cells);
+        for (likelihoods, (clear, _)) in cells.iter().zip(posterior.cells()) {
+            let [low, high] = posterior.clear_band(likelihoods, 0.05);
             assert!(low <= clear && clear <= high, "{low} {clear} {high}");
         }
-        let [low, high] = belief.clear_band(&cells[99], 0.05);
+        let [low, high] = posterior.clear_band(&cells[99], 0.05);
         assert!(high - low > 0.1, "{low} {high}");
     }
 
@@ -360,13 +371,15 @@ mod tests {
                 .collect()
         };
         let mostly_clear = cells(90, 10);
-        let belief = CloudPosterior::of(&mostly_clear);
-        let share = fraction_of(&belief, &mostly_clear).unwrap();
+        let posterior = CloudPosterior::of(&mostly_clear);
+        let share = fraction_of(&posterior, &mostly_clear).unwrap();
         assert!((share.value - 0.1).abs() < 0.03, "{share:?}");
         assert!((0.02..0.1).contains(&share.sigma), "{share:?}");
         // The same cell is more likely clear where most of the sky is.
-        let doubtful = belief.priors.evidence(&evidence(0, 1.0, 10.0), CLEAR_MAG);
-        let (clear, _) = doubtful.posterior(belief.clouded);
+        let doubtful = posterior
+            .priors
+            .evidence(&evidence(0, 1.0, 10.0), CLEAR_MAG);
+        let (clear, _) = doubtful.posterior(posterior.clouded);
         let (less, _) = doubtful.posterior(CloudPosterior::of(&cells(10, 90)).clouded);
         assert!(clear > less + 0.3, "{clear} {less}");
         assert_eq!(fraction_of(&CloudPosterior::of(&[]), &[]), None);

@@ -19,14 +19,14 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Of the clouds over `sky`.
-    pub(super) fn measure(sky: &CloudInputs, witnesses: &[CellStar]) -> Self {
+    pub(super) fn measure(sky: &CloudInputs, cell_stars: &[CellStar]) -> Self {
         /// Larger differences are those of variable stars and wrong names.
         const LARGEST_MAG: f64 = 1.5;
         /// Pairs that a frame has beforehand.
         const BEFOREHAND: f64 = 10.0;
-        let dimmed = witnesses.iter().filter_map(|witness| {
-            let by = sky.clear_sky.dimmed_by(witness.star)?;
-            Some(((witness.star.direction, by.sigma), by))
+        let dimmed = cell_stars.iter().filter_map(|cell_star| {
+            let by = sky.clear_sky.dimmed_by(cell_star.star)?;
+            Some(((cell_star.star.direction, by.sigma), by))
         });
         let (places, dimmed): (Vec<_>, Vec<Estimate>) = dimmed.unzip();
         let [mut thin, mut thin_pairs] = [0.0, BEFOREHAND];

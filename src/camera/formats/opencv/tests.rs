@@ -209,11 +209,11 @@ fn what_is_written_is_read_again() {
         let read = from_opencv_yaml_within(&text, 0.02).unwrap();
         assert_eq!(read.mirrored, camera.mirrored);
         assert!((read.max_angle_rad() - camera.max_angle_rad()).abs() < 1e-9);
-        let told = text.rsplit("largest_error_px: ").next();
-        let told_px: f64 = told.unwrap().trim().parse().unwrap();
-        assert!(told_px < 0.03, "{text}");
+        let stated = text.rsplit("largest_error_px: ").next();
+        let stated_px: f64 = stated.unwrap().trim().parse().unwrap();
+        assert!(stated_px < 0.03, "{text}");
         let largest_px = largest_difference_px(&camera, &read);
-        let tolerance_px = 0.01 + told_px;
+        let tolerance_px = 0.01 + stated_px;
         assert!(largest_px < tolerance_px, "{largest_px} {camera:?}\n{text}");
     }
 }

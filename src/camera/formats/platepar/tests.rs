@@ -167,8 +167,8 @@ fn what_is_written_is_read_again() {
         let pointing = pointing();
         let text = platepar(&camera, &pointing).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let told_px = json["largest_error_px"].as_f64().unwrap();
-        assert!(told_px < TOLERANCE_PX, "{text}");
+        let stated_px = json["largest_error_px"].as_f64().unwrap();
+        assert!(stated_px < TOLERANCE_PX, "{text}");
         let (read, read_pointing) = from_platepar(&text).unwrap();
         assert_eq!(read_pointing.date.to_iso(), pointing.date.to_iso());
         let mut largest_px = 0f64;

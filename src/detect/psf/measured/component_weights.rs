@@ -11,32 +11,32 @@ use multiversion::multiversion;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Standard deviation of a lobe over that of the spot along its shorter axis.
+/// Standard deviation of a component over that of the spot along its shorter axis.
 const COMPONENT_SIZE: f64 = 0.55;
-/// A lobe is not larger than this, in pixels: the pixels blur the edges of a spot no more.
+/// A component is not larger than this, in pixels: the pixels blur the edges of a spot no more.
 const MAX_COMPONENT_PX: f64 = 0.65;
-/// Where that would be too many lobes, they are larger, up to this over that of the spot.
+/// Where that would be too many components, they are larger, up to this over that of the spot.
 const MAX_COMPONENT_SIZE: f64 = 0.85;
-/// Distance of the lobes over their standard deviation: a sum of such lobes has no ripples.
+/// Distance of the components over their standard deviation: a sum of such components has no ripples.
 const PITCH: f64 = 1.15;
-/// Half axes of the ellipse of the lobes, in standard deviations of the spot.
+/// Half axes of the ellipse of the components, in standard deviations of the spot.
 const REACH_SIGMAS: f64 = 2.8;
-/// Most lobes.
+/// Most components.
 const MAX_COMPONENTS: f64 = 120.0;
-/// Lobes with a smaller share are left out.
+/// Components with a smaller share are left out.
 const MIN_WEIGHT: f64 = 1.5e-3;
 
-/// The lobes that a PSF may have.
+/// The components that a PSF may have.
 #[derive(Debug, Clone)]
 pub(super) struct ComponentGrid {
     /// Moments of the spots that it is for.
     pub typical: SpotMoments,
     /// With shares of one.
-    lobes: Vec<GaussianComponent>,
-    /// Distance of each from the centre in standard deviations of the spot without the lobes' own
+    components: Vec<GaussianComponent>,
+    /// Distance of each from the centre in standard deviations of the spot without the components' own
     /// width.
     distances: Vec<f64>,
-    /// Lobes of the same number have the same share: where the PSF is the same turned by 180
+    /// Components of the same number have the same share: where the PSF is the same turned by 180
     /// degrees; where it is the same reflected at the x axis; and where it is both.
     turned: Vec<usize>,
     reflected: Vec<usize>,
@@ -58,7 +58,7 @@ impl ComponentGrid {
         let outline = inverse(total);
         let [[xx, xy], [_, yy]] = total;
         let own = sigma_px * sigma_px;
-        // Of the lobes, without their own width.
+        // Of the components, without their own width.
         let density = inverse([[xx - own, xy], [xy, yy - own]]);
         let square = |[[xx, xy], [_, yy]]: [[f64; 2]; 2], [x, y]: [f64; 2]| {
             xx * x * x + 2.0 * xy * x * y + yy * y * y
@@ -67,7 +67,7 @@ impl ComponentGrid {
         let places = (-steps..=steps).flat_map(|row| {
             (-steps..=steps).map(move |column| [column, row].map(|i| f64::from(i) * pitch_px))
         });
-        let lobes: Vec<GaussianComponent> = places
+        let components: Vec<GaussianComponent> = places
             .filter(|&place| square(outline, place) <= REACH_SIGMAS.powi(2))
             .map(|offset_px| GaussianComponent {
                 offset_px,
@@ -75,27 +75,27 @@ impl ComponentGrid {
                 share: 1.0,
             })
             .collect();
-        let distance = |lobe: &GaussianComponent| square(density, lobe.offset_px).sqrt();
-        let distances: Vec<f64> = lobes.iter().map(distance).collect();
+        let distance = |component: &GaussianComponent| square(density, component.offset_px).sqrt();
+        let distances: Vec<f64> = components.iter().map(distance).collect();
         let class_of = |image: fn([f64; 2]) -> [f64; 2]| -> Vec<usize> {
             let near =
                 |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 0.1 * pitch_px;
-            let class = |(number, lobe): (usize, &GaussianComponent)| {
-                let at = image(lobe.offset_px);
+            let class = |(number, component): (usize, &GaussianComponent)| {
+                let at = image(component.offset_px);
                 let is_same = |other: &GaussianComponent| near(other.offset_px, at);
-                lobes
+                components
                     .iter()
                     .position(is_same)
                     .map_or(number, |other| other.min(number))
             };
-            lobes.iter().enumerate().map(class).collect()
+            components.iter().enumerate().map(class).collect()
         };
         let turned = class_of(|[x, y]| [-x, -y]);
         let reflected = class_of(|[x, y]| [x, -y]);
         let both = class_of(|[x, y]| [-x.abs(), -y.abs()]);
         Self {
             typical,
-            lobes,
+            components,
             distances,
             turned,
             reflected,
@@ -105,7 +105,7 @@ impl ComponentGrid {
 
     /// The class of each number of shares.
     fn classes(&self, form: FieldForm) -> Vec<usize> {
-        let count = self.lobes.len();
+        let count = self.components.len();
         match form {
             FieldForm::Symmetric => self.turned.clone(),
             FieldForm::Fixed => (0..count).collect(),
@@ -125,31 +125,37 @@ impl ComponentGrid {
         shares
     }
 
-    /// The lobes of a Gaussian.
+    /// The components of a Gaussian.
     pub fn gaussian(&self) -> Vec<FieldComponent> {
         let shares = self.expected_weights();
         self.with_weights(&[&shares, &shares])
     }
 
-    /// The lobes that have light, with shares at the centre and in the corners.
+    /// The components that have light, with shares at the centre and in the corners.
     fn with_weights(&self, [centre, corner]: &[&[f64]; 2]) -> Vec<FieldComponent> {
         let [in_centre, in_corner] = [centre, corner].map(|shares| shares.iter().sum::<f64>());
-        let lobe = |((lobe, centre), corner): ((&GaussianComponent, &f64), &f64)| FieldComponent {
-            lobe: GaussianComponent {
-                share: centre / in_centre,
-                ..*lobe
-            },
-            corner_share: corner / in_corner,
-        };
-        let lobes = self.lobes.iter().zip(*centre).zip(*corner).map(lobe);
-        let has_light = |l: &FieldComponent| l.lobe.share.max(l.corner_share) > MIN_WEIGHT;
-        lobes.filter(has_light).collect()
+        let component =
+            |((component, centre), corner): ((&GaussianComponent, &f64), &f64)| FieldComponent {
+                component: GaussianComponent {
+                    share: centre / in_centre,
+                    ..*component
+                },
+                corner_share: corner / in_corner,
+            };
+        let components = self
+            .components
+            .iter()
+            .zip(*centre)
+            .zip(*corner)
+            .map(component);
+        let has_light = |l: &FieldComponent| l.component.share.max(l.corner_share) > MIN_WEIGHT;
+        components.filter(has_light).collect()
     }
 
     /// The normal equations of each half of the stars, those of even and of odd numbers, for a PSF
     /// that changes over the field as `psf` does.
     ///
-    /// `classes`: lobes of the same number always have the same share.
+    /// `classes`: components of the same number always have the same share.
     fn sums<'s>(
         &self,
         psf: &EffectivePsf,
@@ -161,12 +167,12 @@ impl ComponentGrid {
         let mut of_halves = [(); 2].map(|()| LaneSums::new(psf.form, &classes));
         let mut images = ComponentImages::default();
         let mut local = LocalPsf::default();
-        let every_lobe = self.lobes.iter().map(|&lobe| FieldComponent {
-            lobe,
-            corner_share: lobe.share,
+        let every_component = self.components.iter().map(|&component| FieldComponent {
+            component,
+            corner_share: component.share,
         });
         let all = EffectivePsf {
-            components: every_lobe.collect(),
+            components: every_component.collect(),
             ..psf.clone()
         };
         fitter.tabulate(psf);
@@ -219,40 +225,43 @@ impl ComponentGrid {
         sums.solve(&expected, near, &self.classes(form))
     }
 
-    /// The lobes that have light, with these [`Self::weights`].
+    /// The components that have light, with these [`Self::weights`].
     pub fn components_of(&self, shares: &[f64]) -> Vec<FieldComponent> {
-        let corner = shares.chunks(self.lobes.len()).last().unwrap_or_default();
-        self.with_weights(&[&shares[..self.lobes.len()], corner])
+        let corner = shares
+            .chunks(self.components.len())
+            .last()
+            .unwrap_or_default();
+        self.with_weights(&[&shares[..self.components.len()], corner])
     }
 
-    /// The lobes that fit best.
+    /// The components that fit best.
     pub fn solve(&self, sums: &ComponentEquations, form: FieldForm) -> Vec<FieldComponent> {
         self.components_of(&self.weights(sums, form, None))
     }
 }
 
-/// The images of lobes that have the same share, which are summed.
+/// The images of components that have the same share, which are summed.
 #[derive(Debug, Clone)]
 struct ImageClasses {
-    /// The image that each lobe is a part of.
+    /// The image that each component is a part of.
     of_components: Vec<usize>,
-    /// The first lobe of each image.
+    /// The first component of each image.
     first_components: Vec<usize>,
 }
 
 impl ImageClasses {
-    /// An image for each class of lobes.
+    /// An image for each class of components.
     fn new(classes: &[usize]) -> Self {
-        let (of_lobes, _) = ranks(classes);
-        let mut first_lobes = Vec::new();
-        for (lobe, image) in of_lobes.iter().enumerate() {
-            if *image == first_lobes.len() {
-                first_lobes.push(lobe);
+        let (of_components, _) = ranks(classes);
+        let mut first_components = Vec::new();
+        for (component, image) in of_components.iter().enumerate() {
+            if *image == first_components.len() {
+                first_components.push(component);
             }
         }
         Self {
-            of_components: of_lobes,
-            first_components: first_lobes,
+            of_components: of_components,
+            first_components: first_components,
         }
     }
 
@@ -288,7 +297,7 @@ struct ComponentImages {
 }
 
 impl ComponentImages {
-    /// Draws lobes with shares of one, for pixels with weights and values.
+    /// Draws components with shares of one, for pixels with weights and values.
     fn draw(&mut self, star: &PsfStar, local: &LocalPsf, classes: &ImageClasses) {
         let PsfStar { window, spot, .. } = star;
         let pixels = self.values.len();
@@ -330,13 +339,13 @@ impl ComponentImages {
     }
 }
 
-/// Adds lobes to the images that they are a part of, with a spot at this place in a window of this size.
+/// Adds components to the images that they are a part of, with a spot at this place in a window of this size.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_weighted_components(
     images: &mut ComponentImages,
     flux: f32,
-    lobes: &[GaussianComponent],
-    of_lobes: &[usize],
+    components: &[GaussianComponent],
+    of_components: &[usize],
     [x_px, y_px]: [f64; 2],
     size: Size,
 ) {
@@ -349,11 +358,11 @@ fn draw_weighted_components(
         ..
     } = images;
     let pixels = roots.len();
-    for (lobe, &image) in lobes.iter().zip(of_lobes) {
-        let [dx, dy] = lobe.offset_px;
-        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
-        let of_lobe = [part.rows, part.groups];
-        for ([first, end], [of_first, of_end]) in lit[image / BLOCK].iter_mut().zip(of_lobe) {
+    for (component, &image) in components.iter().zip(of_components) {
+        let [dx, dy] = component.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], component.sigma_px, size);
+        let of_component = [part.rows, part.groups];
+        for ([first, end], [of_first, of_end]) in lit[image / BLOCK].iter_mut().zip(of_component) {
             (*first, *end) = ((*first).min(of_first), (*end).max(of_end));
         }
         let block = &mut light[image / BLOCK * pixels..][..pixels];
@@ -361,7 +370,7 @@ fn draw_weighted_components(
     }
 }
 
-/// Adds a lobe to the image of this number of a block, in rows of `width` groups, times the square
+/// Adds a component to the image of this number of a block, in rows of `width` groups, times the square
 /// roots of the weights.
 #[inline(always)]
 fn add_weighted_component(
@@ -530,20 +539,20 @@ impl ComponentEquations {
         sums
     }
 
-    /// The non-negative shares of the lobes, by coordinate descent from `near` ones, or from those of
+    /// The non-negative shares of the components, by coordinate descent from `near` ones, or from those of
     /// `expected`, which count as known to within a part of themselves. Shares of the same class are
     /// equal.
     fn solve(&self, expected: &[f64], near: Option<&[f64]>, classes: &[usize]) -> Vec<f64> {
         /// Uncertainty of what is expected: of the share, and of the largest share.
         const UNCERTAIN: [f64; 2] = [1.0, 0.5];
-        let lobes = expected.len();
+        let components = expected.len();
         let largest = expected.iter().copied().fold(0.0, f64::max);
         let (class_of, count) = ranks(classes);
         let mut matrix = DMatrix::<f64>::zeros(count, count);
         let mut right = vec![0.0; count];
         let mut shares = vec![0.0; count];
         for (number, &class) in class_of.iter().enumerate() {
-            let share = expected[number % lobes];
+            let share = expected[number % components];
             let weight = (UNCERTAIN[0] * share + UNCERTAIN[1] * largest).powi(-2);
             shares[class] = near.map_or(share, |near| near[number]);
             matrix[(class, class)] += weight;
@@ -551,7 +560,7 @@ impl ComponentEquations {
         }
         for (set, of_set) in self.right.iter().enumerate() {
             let class = |set: usize, image: usize| {
-                class_of[set * lobes + self.images.first_components[image]]
+                class_of[set * components + self.images.first_components[image]]
             };
             for i in 0..self.images.first_components.len() {
                 let at = class(set, i);

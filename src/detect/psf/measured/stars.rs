@@ -302,7 +302,7 @@ fn add_pixels<const N: usize>(
     normal.pixels += sum_of(valid) as usize;
 }
 
-/// What larger moments change in a lobe.
+/// What larger moments change in a component.
 struct ComponentChanges {
     /// Inverse of its standard deviation, in px⁻¹.
     per_sigma: f32,
@@ -312,10 +312,10 @@ struct ComponentChanges {
     widening: [[f32; 3]; 3],
 }
 
-/// Adds lobes that have these moments to the pixels of a window, with a spot at this place.
+/// Adds components that have these moments to the pixels of a window, with a spot at this place.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_components(
-    lobes: &[GaussianComponent],
+    components: &[GaussianComponent],
     moments: SpotMoments,
     [x_px, y_px]: [f64; 2],
     size: Size,
@@ -323,44 +323,51 @@ fn draw_components(
     into: &mut [MomentShares],
 ) {
     let stretches = stretch_by(moments);
-    // A single lobe widens itself; those of a mixture move, and widen with the size only.
+    // A single component widens itself; those of a mixture move, and widen with the size only.
     let widening_of = |sigma_px: f64| {
         let wider = 2.0 * sigma_px * sigma_px;
         [[wider, wider, 0.0], [0.0; 3], [0.0; 3]]
     };
-    let of_single = (lobes.len() == 1).then(|| covariance_by(moments));
+    let of_single = (components.len() == 1).then(|| covariance_by(moments));
     let width = size.width.div_ceil(GROUP_PX);
-    for lobe in lobes {
-        let [dx, dy] = lobe.offset_px;
-        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
-        let widening = of_single.unwrap_or_else(|| widening_of(lobe.sigma_px));
+    for component in components {
+        let [dx, dy] = component.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], component.sigma_px, size);
+        let widening = of_single.unwrap_or_else(|| widening_of(component.sigma_px));
         let changes = ComponentChanges {
-            per_sigma: (1.0 / lobe.sigma_px) as f32,
+            per_sigma: (1.0 / component.sigma_px) as f32,
             moves: stretches.map(|rows| rows.map(|[a, b]| (a * dx + b * dy) as f32)),
             widening: widening.map(|of_moment| of_moment.map(|change| change as f32)),
         };
-        add_component_with_moments(lobe.share as f32, &changes, profiles, part, into, width);
+        add_component_with_moments(
+            component.share as f32,
+            &changes,
+            profiles,
+            part,
+            into,
+            width,
+        );
     }
 }
 
 /// The same without the derivatives with respect to the moments.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn draw_still_components(
-    lobes: &[GaussianComponent],
+    components: &[GaussianComponent],
     [x_px, y_px]: [f64; 2],
     size: Size,
     profiles: &mut NarrowProfiles,
     into: &mut [MomentShares],
 ) {
     let width = size.width.div_ceil(GROUP_PX);
-    for lobe in lobes {
-        let [dx, dy] = lobe.offset_px;
-        let part = profiles.fill([x_px + dx, y_px + dy], lobe.sigma_px, size);
-        add_still_component(lobe.share as f32, profiles, part, into, width);
+    for component in components {
+        let [dx, dy] = component.offset_px;
+        let part = profiles.fill([x_px + dx, y_px + dy], component.sigma_px, size);
+        add_still_component(component.share as f32, profiles, part, into, width);
     }
 }
 
-/// Adds a lobe to the rows of `width` groups.
+/// Adds a component to the rows of `width` groups.
 #[allow(
     clippy::needless_range_loop,
     reason = "lanes of several arrays read best as indices"
@@ -405,7 +412,7 @@ fn add_component_with_moments(
     }
 }
 
-/// Adds a lobe and its derivatives with respect to x and y to the rows of `width` groups.
+/// Adds a component and its derivatives with respect to x and y to the rows of `width` groups.
 #[inline(always)]
 fn add_still_component(
     share: f32,

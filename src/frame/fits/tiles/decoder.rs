@@ -105,7 +105,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// The pixels of `tile` as an image that is not compressed has them: big-endian, of ZBITPIX.
-    pub fn pixels(&self, tile: &Tile, account: &ReadBudget) -> Result<Vec<u8>, TileError> {
+    pub fn pixels(&self, tile: &Tile, budget: &ReadBudget) -> Result<Vec<u8>, TileError> {
         let count = tile.pixels();
         let width = self.stored.bytes();
         let data = |column: Option<TileColumn>| match column {
@@ -114,11 +114,11 @@ impl<'a> Decoder<'a> {
         };
         let compressed = data(Some(self.compressed))?;
         if !compressed.is_empty() {
-            return self.decompressed(compressed, tile, account);
+            return self.decompressed(compressed, tile, budget);
         }
         let packed = data(self.gzip)?;
         if !packed.is_empty() {
-            return exactly(gzip::inflate(packed, count, width, account)?, count, width);
+            return exactly(gzip::inflate(packed, count, width, budget)?, count, width);
         }
         let plain = data(self.uncompressed)?;
         if plain.is_empty() {
@@ -139,7 +139,7 @@ impl<'a> Decoder<'a> {
         &self,
         data: &[u8],
         tile: &Tile,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Vec<u8>, TileError> {
         /// Writers may store narrow numbers in words of four bytes.
         const WORD_BYTES: usize = 4;
@@ -148,16 +148,16 @@ impl<'a> Decoder<'a> {
             Some(_) => WORD_BYTES,
             None => width.max(WORD_BYTES),
         };
-        let values = self.method.decode(data, tile, max_width, account)?;
+        let values = self.method.decode(data, tile, max_width, budget)?;
         if let Some(quantization) = &self.quantization {
             let numbers = values.numbers(count)?;
             let quantized = quantization.of_tile(&self.table, tile.row);
             let floats = quantized.floats(&numbers, tile.row);
             return match self.stored {
-                StoredType::F64 => bytes_of(count, floats.map(f64::to_be_bytes), account),
+                StoredType::F64 => bytes_of(count, floats.map(f64::to_be_bytes), budget),
                 _ => {
                     let floats = floats.map(|float| (float as f32).to_be_bytes());
-                    bytes_of(count, floats, account)
+                    bytes_of(count, floats, budget)
                 }
             };
         }
@@ -169,13 +169,13 @@ impl<'a> Decoder<'a> {
                 match self.stored {
                     // Lossy compression may go beyond the type.
                     StoredType::U8 => {
-                        bytes_of(count, numbers.map(|n| [n.clamp(0, 0xff) as u8]), account)
+                        bytes_of(count, numbers.map(|n| [n.clamp(0, 0xff) as u8]), budget)
                     }
                     StoredType::I16 => {
                         let word = |n: i32| n.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
-                        bytes_of(count, numbers.map(|n| word(n).to_be_bytes()), account)
+                        bytes_of(count, numbers.map(|n| word(n).to_be_bytes()), budget)
                     }
-                    _ => bytes_of(count, numbers.map(i32::to_be_bytes), account),
+                    _ => bytes_of(count, numbers.map(i32::to_be_bytes), budget),
                 }
             }
         }
@@ -186,12 +186,12 @@ impl<'a> Decoder<'a> {
 fn bytes_of<const N: usize>(
     count: usize,
     mut values: impl Iterator<Item = [u8; N]>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<u8>, TileError> {
     // Faster than to collect a flat map.
     let mut bytes = vec![0; count * N];
     for places in bytes.as_chunks_mut().0.chunks_mut(PIXELS_BETWEEN_CHECKS) {
-        account.check_interrupt()?;
+        budget.check_interrupt()?;
         let pairs = places.iter_mut().zip(values.by_ref());
         pairs.for_each(|(place, value)| *place = value);
     }

@@ -14,11 +14,11 @@ pub(super) fn inflate(
     data: &[u8],
     count: usize,
     max_width: usize,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<u8>, TileError> {
     let limit = count * max_width;
     let mut bytes = Vec::with_capacity(limit + 1);
-    let reader = MultiGzDecoder::new(account.timed(data));
+    let reader = MultiGzDecoder::new(budget.timed(data));
     reader
         .take(limit as u64 + 1)
         .read_to_end(&mut bytes)

@@ -92,13 +92,13 @@ impl Method {
         data: &[u8],
         tile: &Tile,
         max_width: usize,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Values, TileError> {
         let count = tile.pixels();
         Ok(match self {
-            Self::Rice(rice) => Values::Numbers(rice.decode(data, count, account)?),
+            Self::Rice(rice) => Values::Numbers(rice.decode(data, count, budget)?),
             Self::Plio { offset } => {
-                let mut numbers = plio::decode(data, count, account)?;
+                let mut numbers = plio::decode(data, count, budget)?;
                 for number in &mut numbers {
                     *number = number.wrapping_sub(offset);
                 }
@@ -112,10 +112,10 @@ impl Method {
                 Values::Numbers(hcompress.decode(data, size)?)
             }
             Self::Gzip { is_shuffled: false } => {
-                Values::Bytes(gzip::inflate(data, count, max_width, account)?)
+                Values::Bytes(gzip::inflate(data, count, max_width, budget)?)
             }
             Self::Gzip { is_shuffled: true } => Values::Bytes(gzip::unshuffle(
-                &gzip::inflate(data, count, max_width, account)?,
+                &gzip::inflate(data, count, max_width, budget)?,
                 count,
             )),
             Self::None if data.len() > count * max_width => {

@@ -52,7 +52,7 @@ pub(super) fn unpack(
     unit: &FitsUnit,
     bytes: &[u8],
     pixels: Range<usize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<u8>, FrameError> {
     let grid = TileGrid::new(&unit.axes, &unit.header)?;
     let too_large = || malformed(format!("found tiles of more than {MAX_TILE_PIXELS} pixels"));
@@ -62,10 +62,10 @@ pub(super) fn unpack(
         return Err(too_large());
     }
     let decoder = Decoder::new(unit, TileTable::new(unit, bytes, tiles)?)?;
-    let rows = touching(&grid, tiles, &pixels, account)?;
+    let rows = touching(&grid, tiles, &pixels, budget)?;
     let mut data_bytes = 0;
     for &row in &rows {
-        account.check_time()?;
+        budget.check_time()?;
         data_bytes += decoder.data_bytes(row).map_err(|error| match error {
             TileError::OutsideHeap { .. } if unit.end() > bytes.len() => {
                 truncated(bytes.len(), of_tile(row, &error))
@@ -80,13 +80,13 @@ pub(super) fn unpack(
     let tile_bytes = largest
         .unwrap_or(0)
         .saturating_mul(decoder.bytes_per_pixel());
-    account.hold(tile_bytes as u64)?;
+    budget.hold(tile_bytes as u64)?;
     let mut image = vec![0; pixels.len() * width];
     for &row in &rows {
-        account.check_time()?;
+        budget.check_time()?;
         let tile = grid.tile(row);
-        let decoded = decoder.pixels(&tile, account);
-        let decoded = decoded.map_err(|error| account.why(malformed(of_tile(row, &error))))?;
+        let decoded = decoder.pixels(&tile, budget);
+        let decoded = decoded.map_err(|error| budget.why(malformed(of_tile(row, &error))))?;
         let lines = decoded.chunks_exact(tile.lengths[0] * width);
         for (place, line) in grid.rows(&tile).zip(lines) {
             // Tiles may have pixels of other planes too.
@@ -96,7 +96,7 @@ pub(super) fn unpack(
             }
         }
     }
-    account.release(tile_bytes as u64);
+    budget.release(tile_bytes as u64);
     Ok(image)
 }
 
@@ -105,11 +105,11 @@ fn touching(
     grid: &TileGrid,
     tiles: usize,
     pixels: &Range<usize>,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<usize>, FrameError> {
     let mut rows = Vec::new();
     for row in 0..tiles {
-        account.check_time()?;
+        budget.check_time()?;
         if grid.may_touch(&grid.tile(row), pixels) {
             rows.push(row);
         }

@@ -27,7 +27,7 @@ const WORDS_BETWEEN_CHECKS: usize = 256;
 pub(super) fn decode(
     data: &[u8],
     count: usize,
-    account: &ReadBudget,
+    budget: &ReadBudget,
 ) -> Result<Vec<i32>, TileError> {
     let words: Vec<u16> = data
         .as_chunks()
@@ -42,7 +42,7 @@ pub(super) fn decode(
     let mut words = instructions.iter();
     while let Some(word) = words.next() {
         if words.len().is_multiple_of(WORDS_BETWEEN_CHECKS) {
-            account.check_interrupt()?;
+            budget.check_interrupt()?;
         }
         let (code, number) = (word >> 12, usize::from(word & 0xfff));
         let step = number as i32;

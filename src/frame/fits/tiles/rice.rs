@@ -64,7 +64,7 @@ impl Rice {
         self,
         data: &[u8],
         count: usize,
-        account: &ReadBudget,
+        budget: &ReadBudget,
     ) -> Result<Vec<i32>, TileError> {
         let mut bits = RiceBits::new(data);
         let short = TileError::Short { pixels: count };
@@ -73,7 +73,7 @@ impl Rice {
         let mut pixels = Vec::with_capacity(count);
         let blocks = PIXELS_BETWEEN_CHECKS.next_multiple_of(self.block);
         while pixels.len() < count {
-            account.check_interrupt()?;
+            budget.check_interrupt()?;
             let end = count.min(pixels.len().saturating_add(blocks));
             let decoded = self.extend(&mut pixels, end, &mut bits, &mut value);
             decoded.ok_or(TileError::Short { pixels: count })?;
