@@ -58,7 +58,9 @@ impl Workspace {
     /// Empty buffers with the same settings.
     pub(crate) fn emptied(&self) -> Self {
         let empty = Self::new().on_threads(self.threads);
-        empty.with_memory_limit(self.memory)
+        empty
+            .with_memory_limit(self.memory)
+            .with_interrupt(self.interrupt.clone())
     }
 
     /// Detection ends with [`DetectError::Interrupted`](super::DetectError::Interrupted) when

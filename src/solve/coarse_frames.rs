@@ -9,7 +9,7 @@ use crate::detect::{self, DetectConfig, detect};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{CoarserFields, ObservedStar, StarField};
-use std::cell::{OnceCell, RefCell};
+use std::cell::OnceCell;
 
 /// Sides of the blocks of pixels that are averaged, the cheapest first.
 const FACTORS: [usize; 2] = [4, 2];
@@ -23,20 +23,17 @@ const MAX_DETECTIONS: usize = 1000;
 /// A frame whose stars are detected at a lower resolution, when a search asks for them.
 pub(super) struct CoarseFrames<'a> {
     frame: &'a Frame<'a>,
-    detector: RefCell<&'a mut detect::Workspace>,
+    /// That of the whole frame, whose background is used again.
+    detector: &'a detect::Workspace,
     places: StarPlaces,
     fields: [OnceCell<Option<StarField>>; FACTORS.len()],
 }
 
 impl<'a> CoarseFrames<'a> {
-    pub fn new(
-        frame: &'a Frame<'a>,
-        detector: &'a mut detect::Workspace,
-        places: StarPlaces,
-    ) -> Self {
+    pub fn new(frame: &'a Frame<'a>, detector: &'a detect::Workspace, places: StarPlaces) -> Self {
         Self {
             frame,
-            detector: RefCell::new(detector),
+            detector,
             places,
             fields: Default::default(),
         }
@@ -47,7 +44,6 @@ impl<'a> CoarseFrames<'a> {
         let Self {
             frame, detector, ..
         } = self;
-        let mut detector = detector.borrow_mut();
         let coarse_px = (frame.width / factor) * (frame.height / factor);
         let bytes = (coarse_px * size_of::<f32>()) as u64;
         let is_small = frame.width.min(frame.height) / factor < MIN_SIDE_PX;
@@ -59,7 +55,7 @@ impl<'a> CoarseFrames<'a> {
             max_detections: MAX_DETECTIONS,
             ..DetectConfig::default()
         };
-        let detections = detect(&coarse, &config, &mut detector).ok()?;
+        let detections = detect(&coarse, &config, &mut detector.emptied()).ok()?;
         let field = star_field(&coarse, &detections, self.places);
         let scale = factor as f64;
         // The middle of the first block.
@@ -111,8 +107,8 @@ mod tests {
         };
         let pixels = (0..300 * 320).map(|i| light(i % 320, i / 320)).collect();
         let frame = Frame::new(320, 300, pixels).unwrap();
-        let mut detector = detect::Workspace::new();
-        let coarser = CoarseFrames::new(&frame, &mut detector, StarPlaces::default());
+        let detector = detect::Workspace::new();
+        let coarser = CoarseFrames::new(&frame, &detector, StarPlaces::default());
         for number in 0..coarser.count() {
             let field = coarser.field(number).unwrap();
             assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
@@ -123,9 +119,8 @@ mod tests {
             }
         }
         let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
-        let mut detector = detect::Workspace::new();
         assert!(
-            CoarseFrames::new(&small, &mut detector, StarPlaces::default())
+            CoarseFrames::new(&small, &detector, StarPlaces::default())
                 .field(0)
                 .is_none()
         );

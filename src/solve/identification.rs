@@ -175,7 +175,7 @@ fn may_be_negative(reason: &Reason) -> bool {
 fn negative(
     frame: &Frame,
     detections: &Detections,
-    detector: &mut detect::Workspace,
+    detector: &detect::Workspace,
 ) -> Option<Diagnosis> {
     /// Fewer dark spots may be anything.
     const MIN_SPOTS: usize = 10;
@@ -197,7 +197,7 @@ fn negative(
         max_detections: 1000,
         ..DetectConfig::default()
     };
-    let inverted = detect(&frame.inverted(), &config, detector).ok()?;
+    let inverted = detect(&frame.inverted(), &config, &mut detector.emptied()).ok()?;
     let stands_out = |source: &&Detection| source.snr >= MIN_SNR;
     let bright = detections.sources.iter().filter(stands_out).count();
     let dark = inverted.sources.iter().filter(stands_out);

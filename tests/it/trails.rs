@@ -2,6 +2,8 @@
 
 use crate::common::{Ran, number, orion, shared_dir, starpipe};
 use serde_json::Value;
+use starpipe::detect::{self, DetectConfig};
+use starpipe::{Context, Frame, IndexedCatalog, Workspace, solve_frame};
 use std::fs;
 use std::path::Path;
 
@@ -112,4 +114,54 @@ fn of_the_real_frames_one_has_a_satellite() {
             "{trail}"
         );
     }
+}
+
+/// Spots that are no stars of the sky, and a line, over light that grows across the frame.
+fn unknown_stars_and_a_line() -> Frame<'static> {
+    const SIDE: usize = 400;
+    let random = |seed: usize| ((seed * 7919 + 104_729) * 6271 % 10_007) as f64 / 10_007.0;
+    let spots: Vec<[f64; 3]> = (0..60)
+        .map(|spot| {
+            let of = |axis: usize| random(3 * spot + axis);
+            [
+                SIDE as f64 * of(0),
+                SIDE as f64 * of(1),
+                300.0 + 3000.0 * of(2),
+            ]
+        })
+        .collect();
+    let light = |x: f64, y: f64| {
+        let of_spots = spots.iter().map(|[sx, sy, peak]| {
+            let square = (x - sx).powi(2) + (y - sy).powi(2);
+            peak * (-square / 4.5).exp()
+        });
+        let across = 0.6 * (x - 50.0) - 0.8 * (y - 40.0);
+        let is_beside = (60.0..320.0).contains(&x);
+        let of_line = if is_beside {
+            60.0 * (-across * across / 4.5).exp()
+        } else {
+            0.0
+        };
+        0.01 * x * x + of_spots.sum::<f64>() + of_line
+    };
+    let pixel = |at: usize| {
+        let (x, y) = (at % SIDE, at / SIDE);
+        (100.0 + 20.0 * random(at + 77) + light(x as f64, y as f64)) as f32
+    };
+    Frame::new(SIDE, SIDE, (0..SIDE * SIDE).map(pixel).collect()).unwrap()
+}
+
+#[test]
+fn trails_are_those_of_the_whole_frame_after_a_search_at_lower_resolution() {
+    let indexed = IndexedCatalog::built_in();
+    let mut context = Context::new(&indexed);
+    context.find_trails = true;
+    let frame = unknown_stars_and_a_line();
+    let solution = solve_frame(&frame, &context, &mut Workspace::new()).unwrap();
+    assert!(solution.outcome.identification().is_none());
+    let mut detector = detect::Workspace::new();
+    let found = detect::detect(&frame, &DetectConfig::default(), &mut detector).unwrap();
+    let expected = detector.find_trails(&frame, &found);
+    assert_eq!(expected.len(), 1);
+    assert_eq!(solution.trails, Some(expected));
 }

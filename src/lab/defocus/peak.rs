@@ -149,35 +149,6 @@ impl PeakStudy {
         }
     }
 
-    /// The error without noise of a spot that ends at this distance from the star: the circular
-    /// support C of eq. (1), whose radius the paper does not state. A pixel is in it or not, as its
-    /// centre is. Beyond the corners of the window it is that of [`Self::expected`].
-    pub fn bias_with_support_px(&self, spot_px: f64, support_px: f64) -> f64 {
-        let half = self.half_window_px as f64;
-        let (mut columns, mut rows) = (Vec::new(), Vec::new());
-        let place = |i: usize| (i as f64 + 0.5) / PLACES as f64 - 0.5;
-        let mut squares = 0.0;
-        for (at_x, at_y) in (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (place(x), place(y))))
-        {
-            self.fractions(spot_px, at_x, &mut columns);
-            self.fractions(spot_px, at_y, &mut rows);
-            let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
-            for (y, row) in rows.iter().enumerate() {
-                let y = y as f64 - half;
-                for (x, column) in columns.iter().enumerate() {
-                    let x = x as f64 - half;
-                    if libm::hypot(x - at_x, y - at_y) <= support_px {
-                        sum += row * column;
-                        sum_x += x * row * column;
-                        sum_y += y * row * column;
-                    }
-                }
-            }
-            squares += (sum_x / sum - at_x).powi(2) + (sum_y / sum - at_y).powi(2);
-        }
-        (squares / (PLACES * PLACES) as f64).sqrt()
-    }
-
     fn sums(&self, spot_px: f64, truth: f64, shares_of: Shares) -> AxisSums {
         let mut shares = Vec::new();
         shares_of(self, spot_px, truth, &mut shares);
@@ -276,6 +247,35 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
+    /// The error without noise of a spot that ends at this distance from the star: the circular
+    /// support C of eq. (1), whose radius the paper does not state. A pixel is in it or not, as its
+    /// centre is. Beyond the corners of the window it is that of [`PeakStudy::expected`].
+    fn bias_with_support_px(study: &PeakStudy, spot_px: f64, support_px: f64) -> f64 {
+        let half = study.half_window_px as f64;
+        let (mut columns, mut rows) = (Vec::new(), Vec::new());
+        let place = |i: usize| (i as f64 + 0.5) / PLACES as f64 - 0.5;
+        let mut squares = 0.0;
+        for (at_x, at_y) in (0..PLACES).flat_map(|y| (0..PLACES).map(move |x| (place(x), place(y))))
+        {
+            study.fractions(spot_px, at_x, &mut columns);
+            study.fractions(spot_px, at_y, &mut rows);
+            let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+            for (y, row) in rows.iter().enumerate() {
+                let y = y as f64 - half;
+                for (x, column) in columns.iter().enumerate() {
+                    let x = x as f64 - half;
+                    if libm::hypot(x - at_x, y - at_y) <= support_px {
+                        sum += row * column;
+                        sum_x += x * row * column;
+                        sum_y += y * row * column;
+                    }
+                }
+            }
+            squares += (sum_x / sum - at_x).powi(2) + (sum_y / sum - at_y).powi(2);
+        }
+        (squares / (PLACES * PLACES) as f64).sqrt()
+    }
+
     #[test]
     fn a_centred_spot_has_its_peak_in_the_middle() {
         let study = PeakStudy::default();
@@ -352,7 +352,7 @@ mod tests {
         let study = PeakStudy::default();
         for spot_px in [0.4, 1.0, 2.0, 2.4] {
             let whole = study.expected(spot_px, 0.0).bias_px;
-            let bias = |support_px: f64| study.bias_with_support_px(spot_px, support_px);
+            let bias = |support_px: f64| bias_with_support_px(&study, spot_px, support_px);
             println!(
                 "| {spot_px} | {whole:.4} | {:.4} | {:.4} | {:.4} | {:.4} |",
                 bias(7.0),
@@ -363,8 +363,8 @@ mod tests {
             assert!((bias(20.0) - whole).abs() < 1e-9, "{spot_px}");
         }
         // A wide spot that ends round the star has no edge of the window on one side.
-        assert!(study.bias_with_support_px(2.4, 7.0) < study.expected(2.4, 0.0).bias_px);
-        assert!(study.bias_with_support_px(1.0, 3.0) > study.expected(1.0, 0.0).bias_px);
+        assert!(bias_with_support_px(&study, 2.4, 7.0) < study.expected(2.4, 0.0).bias_px);
+        assert!(bias_with_support_px(&study, 1.0, 3.0) > study.expected(1.0, 0.0).bias_px);
     }
 
     #[test]

@@ -260,8 +260,8 @@ impl ImageClasses {
             }
         }
         Self {
-            of_components: of_components,
-            first_components: first_components,
+            of_components,
+            first_components,
         }
     }
 
