@@ -8,11 +8,11 @@ use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::archive::{
-    self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
-};
 use starpipe::base::table::FieldValue;
 use starpipe::report::{FrameReport, StarRow};
+use starpipe::store::{
+    self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
+};
 use std::num::NonZeroUsize;
 
 /// What is stated for all frames.
@@ -113,7 +113,7 @@ impl PartRows {
         let Tables { frames, stars } = self.0.take().ok_or_else(finished)?;
         let frames = frames.finish().map_err(exception)?;
         let stars = stars.finish().map_err(exception)?;
-        let checksums = archive::checksums(&frames, &stars);
+        let checksums = store::checksums(&frames, &stars);
         Ok([&frames[..], &stars, checksums.as_bytes()].map(|file| PyBytes::new(py, file)))
     }
 }

@@ -11,8 +11,8 @@ use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
 use nights::{NightLine, nights_text};
-use starpipe::archive::{Archive, ArchiveStatus, merge, status, summary};
 use starpipe::base::format::{printable, ranges};
+use starpipe::store::{Archive, ArchiveStatus, merge, status, summary};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -2,9 +2,9 @@
 
 use crate::cli::output::files::NewFile;
 use crate::cli::output::rows::json_indented;
-use starpipe::archive::TableWriter;
 use starpipe::base::table::{finished, write_row};
 use starpipe::night::{self, NightRow, NightSummary, SkyglowStation, skyglow};
+use starpipe::store::TableWriter;
 use std::path::Path;
 
 /// Names of the files, beside that of the run.

@@ -22,11 +22,11 @@ use super::output::messages::report_mended;
 use super::output::rows::json_line;
 use super::solving::SolvingPlan;
 use run::{BATCH, MeasuredNight, NightRun};
-use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::catalog::Catalog;
 use starpipe::frame::Cameras;
 use starpipe::identify::lens::MEASURED_BY;
 use starpipe::night::{PassedOverFiles, SkyglowStation, summarize};
+use starpipe::store::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -105,10 +105,10 @@ fn claim(
             files::RUN
         )));
     }
-    let frames = archive::Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
+    let frames = store::Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
     let identity = Identity::new(&frames, &configuration(arguments, plan, catalog)?)?;
     let is_own = || is_own(directory, &identity);
-    let is_mended = archive::claim_file(directory, files::RUN, &identity, is_own);
+    let is_mended = store::claim_file(directory, files::RUN, &identity, is_own);
     let is_mended = is_mended.map_err(|error| match error {
         ArchiveError::OtherRun { .. } | ArchiveError::Damaged { .. } => {
             CommandError::usage(format_args!("{error}; choose another directory for --out"))

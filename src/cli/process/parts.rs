@@ -8,13 +8,13 @@ use crate::cli::progress::frames_bar;
 use crate::cli::solving::options::SolvingOptions;
 use crate::cli::solving::{InputSolver, Inputs, Sink, SolvedImage};
 use indicatif::ProgressBar;
-use starpipe::archive::{
-    Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
-};
 use starpipe::base::format::counted;
 use starpipe::catalog::Catalog;
 use starpipe::frame::{Cameras, ImageName, PageChoice};
 use starpipe::report::{FrameReport, StarRow};
+use starpipe::store::{
+    Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
+};
 use std::ops::ControlFlow;
 use std::path::Path;
 

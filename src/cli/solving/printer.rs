@@ -4,10 +4,10 @@ use super::frame_table::{self, RunSummary};
 use super::options::{OutputOptions, ReportFormat};
 use crate::cli::exit::OutcomeTally;
 use crate::cli::output::stdout::print;
-use starpipe::archive::FrameRow;
 use starpipe::base::remedy::OptionNames;
 use starpipe::base::table::{finished, write_row};
 use starpipe::report::{FrameReport, TextOptions};
+use starpipe::store::FrameRow;
 use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
 

@@ -2,10 +2,10 @@
 
 use crate::cli::output::files::remove_outdated;
 use anyhow::Context;
-use starpipe::archive::TableWriter;
 use starpipe::base::files::{beside, finish, make_directory};
 use starpipe::lab::validation::store::{RunTables, StoreError};
 use starpipe::lab::validation::{FrameRecord, StarRecord, TableRow};
+use starpipe::store::TableWriter;
 use std::path::{Path, PathBuf};
 
 /// The parts in a run's directory.
