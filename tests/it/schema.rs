@@ -2,7 +2,7 @@
 
 use crate::common::{Ran, fixture, number, report, starpipe};
 use serde_json::Value;
-use starpipe::base::table::Column;
+use starpipe::base::table::{Column, TableRow};
 use starpipe::report::StarRow;
 use starpipe::store::FrameRow;
 

@@ -142,6 +142,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "centroids",
             "solve",
             "night",
+            "store",
         ],
     ),
 ];
