@@ -18,7 +18,7 @@ pub enum FieldValue {
 
 impl FieldValue {
     /// Whether there is no value.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         matches!(
             self,
             Self::Integer(None) | Self::Number(None) | Self::Bool(None) | Self::Text(None)

@@ -98,7 +98,7 @@ impl Identity {
     }
 
     /// The frames with these names in the parts that they were cut into, if they are its frames.
-    pub(super) fn plan(&self, names: Vec<String>) -> Option<Plan> {
+    pub fn plan(&self, names: Vec<String>) -> Option<Plan> {
         let per_part = usize::try_from(self.values["frames_per_part"].as_u64()?).ok()?;
         let plan = Plan::new(names, NonZeroUsize::new(per_part)?).ok()?;
         (self.values["names"] == plan.names_hash()).then_some(plan)
