@@ -57,7 +57,7 @@
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
-//! | `archive` | what do many frames show: tables in Parquet, made in parts (feature `archive`) |
+//! | `store` | whose are the results of many frames: runs that go on after an interruption, and their tables |
 //! | [`lab`] | is it good enough: simulated frames, validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].
@@ -71,9 +71,6 @@
 // The same frame gives the same bytes on every system.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-#[cfg(feature = "archive")]
-#[doc(hidden)]
-pub mod archive;
 #[doc(hidden)]
 pub mod base;
 pub mod calibration;
@@ -92,6 +89,8 @@ pub mod predict;
 pub mod report;
 pub mod sky;
 pub mod solve;
+#[doc(hidden)]
+pub mod store;
 pub mod track;
 
 pub use base::clock::UtcOffset;

@@ -1,11 +1,11 @@
 //! Readers of catalogues, descriptions and tables.
 
 use super::scratch::{directory, with_file};
-use starpipe::archive::names_in;
 use starpipe::calibration::read_hot_pixels;
 use starpipe::camera::data_sheet::{DataSheet, Response, SpotImage};
 use starpipe::catalog::Catalog;
-use starpipe::lab::validation::store::RunTables;
+use starpipe::lab::validation::RunTables;
+use starpipe::store::names_in;
 use starpipe::{IndexedCatalog, Interrupt};
 use std::fs;
 use std::path::Path;

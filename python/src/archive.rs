@@ -8,11 +8,11 @@ use bytes::Bytes;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use starpipe::archive::{
-    self, Configuration, FileHash, FrameRow, Identity, Nights, Plan, TableWriter,
-};
-use starpipe::base::table::FieldValue;
+use starpipe::base::table::{FieldValue, TableRow};
 use starpipe::report::{FrameReport, StarRow};
+use starpipe::store::{
+    self, Configuration, FileHash, FrameRow, Identity, Nights, PartTables, Plan,
+};
 use std::num::NonZeroUsize;
 
 /// What is stated for all frames.
@@ -78,23 +78,14 @@ pub fn archive_differences(found: &str, wanted: &str) -> PyResult<Vec<String>> {
 
 /// The rows of a part.
 #[pyclass(module = "starpipe._starpipe")]
-pub struct PartRows(Option<Tables>);
-
-struct Tables {
-    frames: TableWriter<FrameRow, Vec<u8>>,
-    stars: TableWriter<StarRow, Vec<u8>>,
-}
+pub struct PartRows(Option<PartTables<Vec<u8>>>);
 
 #[pymethods]
 impl PartRows {
     #[new]
     fn new() -> PyResult<Self> {
-        let frames = TableWriter::new(Vec::new(), "frames", FrameRow::columns());
-        let stars = TableWriter::new(Vec::new(), "stars", StarRow::columns());
-        Ok(Self(Some(Tables {
-            frames: frames.map_err(exception)?,
-            stars: stars.map_err(exception)?,
-        })))
+        let tables = PartTables::new([Vec::new(), Vec::new()]);
+        Ok(Self(Some(tables.map_err(exception)?)))
     }
 
     /// Adds a solved frame and its stars; returns its status.
@@ -105,15 +96,14 @@ impl PartRows {
     /// Adds a frame that could not be read.
     fn add_unread(&mut self, name: &str, reason: String) -> PyResult<()> {
         let row = FrameRow::unread(name, reason);
-        self.tables()?.frames.add(row).map_err(exception)
+        self.tables()?.add(row, []).map_err(exception)
     }
 
     /// The files of frames and of stars, and of their checksums.
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<[Bound<'py, PyBytes>; 3]> {
-        let Tables { frames, stars } = self.0.take().ok_or_else(finished)?;
-        let frames = frames.finish().map_err(exception)?;
-        let stars = stars.finish().map_err(exception)?;
-        let checksums = archive::checksums(&frames, &stars);
+        let tables = self.0.take().ok_or_else(finished)?;
+        let [frames, stars] = tables.finish().map_err(exception)?;
+        let checksums = store::checksums(&frames, &stars);
         Ok([&frames[..], &stars, checksums.as_bytes()].map(|file| PyBytes::new(py, file)))
     }
 }
@@ -124,15 +114,12 @@ impl PartRows {
         let report = FrameReport::new(&solved.name, &solved.solution, catalog);
         let frame = FrameRow::new(&report, &solved.solution);
         let status = frame.status.clone();
-        let tables = self.tables()?;
-        tables.frames.add(frame).map_err(exception)?;
-        for star in StarRow::of_frame(&report) {
-            tables.stars.add(star).map_err(exception)?;
-        }
+        let added = self.tables()?.add(frame, StarRow::of_frame(&report));
+        added.map_err(exception)?;
         Ok(status)
     }
 
-    fn tables(&mut self) -> PyResult<&mut Tables> {
+    fn tables(&mut self) -> PyResult<&mut PartTables<Vec<u8>>> {
         self.0.as_mut().ok_or_else(finished)
     }
 }

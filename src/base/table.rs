@@ -17,6 +17,14 @@ pub enum FieldValue {
 }
 
 impl FieldValue {
+    /// Whether there is no value.
+    pub fn is_empty(&self) -> bool {
+        matches!(
+            self,
+            Self::Integer(None) | Self::Number(None) | Self::Bool(None) | Self::Text(None)
+        )
+    }
+
     /// The text, if it is one.
     pub(crate) fn into_text(self) -> Option<String> {
         match self {
@@ -49,12 +57,31 @@ impl FieldValue {
 ///
 /// # Errors
 /// Errors of the writer.
-pub fn write_row<R, W: io::Write>(
+pub(crate) fn write_row<R, W: io::Write>(
     writer: &mut csv::Writer<W>,
     columns: &[Column<R>],
     row: &R,
 ) -> csv::Result<()> {
     writer.write_record(columns.iter().map(|column| (column.value)(row).to_csv()))
+}
+
+/// Rows as CSV, after the names of their columns if there is a heading.
+///
+/// # Errors
+/// As for [`finished`], and errors of the writer.
+pub fn csv_of<'r, R: TableRow + 'r>(
+    rows: impl IntoIterator<Item = &'r R>,
+    has_heading: bool,
+) -> io::Result<String> {
+    let columns = R::columns();
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    if has_heading {
+        writer.write_record(columns.iter().map(|column| column.name))?;
+    }
+    for row in rows {
+        write_row(&mut writer, &columns, row)?;
+    }
+    finished(writer)
 }
 
 /// The table that `writer` has written, with names as terminals and spreadsheets may show them: on one
@@ -221,3 +248,37 @@ macro_rules! columns {
     };
 }
 pub(crate) use columns;
+
+/// A row of a table.
+pub trait TableRow: Sized {
+    /// The table's name.
+    const TABLE: &'static str;
+
+    /// Its columns, in their order.
+    fn columns() -> Vec<Column<Self>>;
+}
+
+/// A row of the table `$table`: each field with its unit, UCD and description; and fields that are no columns.
+macro_rules! table_row {
+    ($(#[$attribute:meta])* $row:ident in $table:literal {
+        $($field:ident: $type:ty, $unit:literal, $ucd:literal, $description:literal;)*
+    } $(and { $($(#[$about:meta])* $other:ident: $other_type:ty,)* })?) => {
+        $(#[$attribute])*
+        pub struct $row {
+            $(
+                #[doc = $description]
+                pub $field: $type,
+            )*
+            $($($(#[$about])* pub $other: $other_type,)*)?
+        }
+
+        impl $crate::base::table::TableRow for $row {
+            const TABLE: &'static str = $table;
+
+            fn columns() -> Vec<$crate::base::table::Column<Self>> {
+                $crate::base::table::columns! { Self: $($field, $unit, $ucd, $description;)* }
+            }
+        }
+    };
+}
+pub(crate) use table_row;

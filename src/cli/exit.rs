@@ -1,5 +1,6 @@
 //! How a command ends: its output, its exit status, its errors.
 
+use starpipe::store::StoreError;
 use std::fmt::Display;
 use std::process::ExitCode;
 
@@ -108,6 +109,15 @@ impl CommandError {
     /// The command line is wrong.
     pub(crate) fn usage(message: impl Display) -> Self {
         Self::Usage(message.to_string())
+    }
+
+    /// Why the results of a run cannot be used. A directory that holds something else is an error of the command
+    /// line, of its option `option`.
+    pub(crate) fn of_store(error: StoreError, option: &str) -> Self {
+        if error.is_of_directory() {
+            return Self::Usage(format!("{error}; choose another directory for {option}"));
+        }
+        Self::Failed(error.into())
     }
 }
 

@@ -8,7 +8,7 @@ use crate::base::coords::{Camera, Horizon, Rotation};
 use crate::base::epoch::ObservationDate;
 use crate::base::format::{finite, to_decimals};
 use crate::base::statistics::{Estimate, median_of};
-use crate::base::table::{Column, columns};
+use crate::base::table::table_row;
 use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::identify::Identification;
 use crate::sky::{Place, SkyCell, SkyMap};
@@ -16,52 +16,55 @@ use crate::solve::{Outcome, Solution};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// A frame of a night. A text is empty where there is none.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "`columns` has unit and description of each")]
-pub struct NightRow {
-    pub frame: String,
-    pub date: String,
-    pub mjd: Option<f64>,
-    pub status: String,
-    pub reason_code: String,
-    pub pointing: String,
-    pub altitude_deg: Option<f64>,
-    pub azimuth_deg: Option<f64>,
-    pub qw: Option<f64>,
-    pub qx: Option<f64>,
-    pub qy: Option<f64>,
-    pub qz: Option<f64>,
-    pub pointing_sigma_arcsec: Option<f64>,
-    pub shift_arcmin: Option<f64>,
-    pub pixel_scale_arcsec: Option<f64>,
-    pub detected: Option<u64>,
-    pub trails: Option<u64>,
-    pub matched: Option<u64>,
-    pub spot_sigma_px: Option<f64>,
-    pub limit_vmag: Option<f64>,
-    pub limit_sigma_mag: Option<f64>,
-    pub expected_limit_vmag: Option<f64>,
-    pub limit_difference_mag: Option<f64>,
-    pub clear_limit_vmag: Option<f64>,
-    pub clear_limit_difference_mag: Option<f64>,
-    pub zenith_mag_arcsec2: Option<f64>,
-    pub zenith_sigma_mag: Option<f64>,
-    pub naked_eye_limit_vmag: Option<f64>,
-    pub extinction_mag_per_airmass: Option<f64>,
-    pub extinction_sigma_mag: Option<f64>,
-    pub extinction_measured: bool,
-    pub zero_point_vmag: Option<f64>,
-    pub zero_point_sigma_mag: Option<f64>,
-    pub dimming_mag: Option<f64>,
-    pub cloud_share: Option<f64>,
-    pub cloud_share_sigma: Option<f64>,
-    pub moon_altitude_deg: Option<f64>,
-    pub moon_azimuth_deg: Option<f64>,
-    pub moon_illuminated: Option<f64>,
-    pub sun_altitude_deg: Option<f64>,
-    pub twilight: String,
-    pub cells: Option<NightCells>,
+table_row! {
+    /// A frame of a night. A text is empty where there is none.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+    NightRow in "night" {
+        frame: String, "", "meta.id;meta.main", "File of the frame";
+        date: String, "", "time.epoch", "Date in UTC";
+        mjd: Option<f64>, "d", "time.epoch", "The same as Modified Julian Date";
+        status: String, "", "meta.code.status", "identified, not_identified, unread or passed_over";
+        reason_code: String, "", "meta.code.error", "Why its stars are not identified, or what is passed over";
+        pointing: String, "", "meta.code", "frame: by its stars; held: by the mount and the date";
+        altitude_deg: Option<f64>, "deg", "pos.az.alt", "Apparent altitude of the boresight";
+        azimuth_deg: Option<f64>, "deg", "pos.az.azi", "Azimuth of the boresight, from north through east";
+        qw: Option<f64>, "", "pos.az", "Quaternion from (east, north, zenith) to camera axes, real part";
+        qx: Option<f64>, "", "pos.az", "Its x";
+        qy: Option<f64>, "", "pos.az", "Its y";
+        qz: Option<f64>, "", "pos.az", "Its z";
+        pointing_sigma_arcsec: Option<f64>, "arcsec", "stat.error;pos.az", "Standard error of the pointing, the largest of the three axes";
+        shift_arcmin: Option<f64>, "arcmin", "pos.angDistance", "Angle by which the camera differs from how it is held";
+        pixel_scale_arcsec: Option<f64>, "arcsec", "instr.pixel", "Angle of a pixel on the axis";
+        detected: Option<u64>, "", "meta.number", "Detections";
+        trails: Option<u64>, "", "meta.number", "Trails of satellites, aeroplanes and meteors";
+        matched: Option<u64>, "", "meta.number", "Identified stars";
+        spot_sigma_px: Option<f64>, "pix", "instr.det.psf", "Standard deviation of a star's spot";
+        limit_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
+        limit_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag", "Its standard error";
+        expected_limit_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;meta.modelled", "The same as the camera's description predicts it";
+        limit_difference_mag: Option<f64>, "mag", "arith.diff;phot.mag", "Measured minus predicted";
+        clear_limit_vmag: Option<f64>, "mag", "phot.mag;em.opt.V", "Median of the limits in clear cells above 30 degrees";
+        clear_limit_difference_mag: Option<f64>, "mag", "arith.diff;phot.mag", "Median of measured minus expected limits in the same cells";
+        zenith_mag_arcsec2: Option<f64>, "mag.arcsec**-2", "phot.mag.sb;em.opt.V", "Brightness of the zenith";
+        zenith_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag.sb", "Its standard error";
+        naked_eye_limit_vmag: Option<f64>, "mag", "phot.mag;em.opt.V", "Faintest star for the unaided eye at the zenith";
+        extinction_mag_per_airmass: Option<f64>, "mag", "obs.atmos.extinction", "Extinction per airmass";
+        extinction_sigma_mag: Option<f64>, "mag", "stat.error;obs.atmos.extinction", "Its standard error";
+        extinction_measured: bool, "", "meta.code", "Whether the stars of the frame tell it, and not experience";
+        zero_point_vmag: Option<f64>, "mag", "phot.calib.zeroPoint", "V magnitude of a star outside the atmosphere that gives 1 ADU/s";
+        zero_point_sigma_mag: Option<f64>, "mag", "stat.error;phot.calib.zeroPoint", "Its standard error";
+        dimming_mag: Option<f64>, "mag", "arith.diff;phot.mag", "Light of stars at the zenith lost since the clearest frame of the start";
+        cloud_share: Option<f64>, "", "obs.atmos", "Share of the sky in the frame that is behind clouds";
+        cloud_share_sigma: Option<f64>, "", "stat.error;obs.atmos", "Its standard error";
+        moon_altitude_deg: Option<f64>, "deg", "pos.az.alt", "Altitude of the Moon";
+        moon_azimuth_deg: Option<f64>, "deg", "pos.az.azi", "Azimuth of the Moon";
+        moon_illuminated: Option<f64>, "", "phys.area;arith.ratio", "Illuminated share of the Moon's disk";
+        sun_altitude_deg: Option<f64>, "deg", "pos.az.alt", "Altitude of the Sun";
+        twilight: String, "", "meta.code", "day, civil, nautical, astronomical or night";
+    } and {
+        /// What the sky map shows, cell by cell: no column.
+        cells: Option<NightCells>,
+    }
 }
 
 /// Status of a frame whose stars are identified.
@@ -76,53 +79,6 @@ const QUATERNION_DECIMALS: i32 = 9;
 const DAY_DECIMALS: i32 = 6;
 
 impl NightRow {
-    /// The columns of the table.
-    pub fn columns() -> Vec<Column<Self>> {
-        columns! { Self:
-            frame, "", "meta.id;meta.main", "File of the frame";
-            date, "", "time.epoch", "Date in UTC";
-            mjd, "d", "time.epoch", "The same as Modified Julian Date";
-            status, "", "meta.code.status", "identified, not_identified, unread or passed_over";
-            reason_code, "", "meta.code.error", "Why its stars are not identified, or what is passed over";
-            pointing, "", "meta.code", "frame: by its stars; held: by the mount and the date";
-            altitude_deg, "deg", "pos.az.alt", "Apparent altitude of the boresight";
-            azimuth_deg, "deg", "pos.az.azi", "Azimuth of the boresight, from north through east";
-            qw, "", "pos.az", "Quaternion from (east, north, zenith) to camera axes, real part";
-            qx, "", "pos.az", "Its x";
-            qy, "", "pos.az", "Its y";
-            qz, "", "pos.az", "Its z";
-            pointing_sigma_arcsec, "arcsec", "stat.error;pos.az", "Standard error of the pointing, the largest of the three axes";
-            shift_arcmin, "arcmin", "pos.angDistance", "Angle by which the camera differs from how it is held";
-            pixel_scale_arcsec, "arcsec", "instr.pixel", "Angle of a pixel on the axis";
-            detected, "", "meta.number", "Detections";
-            trails, "", "meta.number", "Trails of satellites, aeroplanes and meteors";
-            matched, "", "meta.number", "Identified stars";
-            spot_sigma_px, "pix", "instr.det.psf", "Standard deviation of a star's spot";
-            limit_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
-            limit_sigma_mag, "mag", "stat.error;phot.mag", "Its standard error";
-            expected_limit_vmag, "mag", "phot.mag;em.opt.V;meta.modelled", "The same as the camera's description predicts it";
-            limit_difference_mag, "mag", "arith.diff;phot.mag", "Measured minus predicted";
-            clear_limit_vmag, "mag", "phot.mag;em.opt.V", "Median of the limits in clear cells above 30 degrees";
-            clear_limit_difference_mag, "mag", "arith.diff;phot.mag", "Median of measured minus expected limits in the same cells";
-            zenith_mag_arcsec2, "mag.arcsec**-2", "phot.mag.sb;em.opt.V", "Brightness of the zenith";
-            zenith_sigma_mag, "mag", "stat.error;phot.mag.sb", "Its standard error";
-            naked_eye_limit_vmag, "mag", "phot.mag;em.opt.V", "Faintest star for the unaided eye at the zenith";
-            extinction_mag_per_airmass, "mag", "obs.atmos.extinction", "Extinction per airmass";
-            extinction_sigma_mag, "mag", "stat.error;obs.atmos.extinction", "Its standard error";
-            extinction_measured, "", "meta.code", "Whether the stars of the frame tell it, and not experience";
-            zero_point_vmag, "mag", "phot.calib.zeroPoint", "V magnitude of a star outside the atmosphere that gives 1 ADU/s";
-            zero_point_sigma_mag, "mag", "stat.error;phot.calib.zeroPoint", "Its standard error";
-            dimming_mag, "mag", "arith.diff;phot.mag", "Light of stars at the zenith lost since the clearest frame of the start";
-            cloud_share, "", "obs.atmos", "Share of the sky in the frame that is behind clouds";
-            cloud_share_sigma, "", "stat.error;obs.atmos", "Its standard error";
-            moon_altitude_deg, "deg", "pos.az.alt", "Altitude of the Moon";
-            moon_azimuth_deg, "deg", "pos.az.azi", "Azimuth of the Moon";
-            moon_illuminated, "", "phys.area;arith.ratio", "Illuminated share of the Moon's disk";
-            sun_altitude_deg, "deg", "pos.az.alt", "Altitude of the Sun";
-            twilight, "", "meta.code", "day, civil, nautical, astronomical or night";
-        }
-    }
-
     /// The row of a frame that was read. `clear_ground_vmag` is the zero point through one airmass of the
     /// clearest frame of the start.
     pub fn from_solution(frame: &str, solution: &Solution, clear_ground_vmag: Option<f64>) -> Self {

@@ -47,7 +47,7 @@ pub use frame_report::{
 pub use frame_report::{FrameReport, SCHEMA};
 pub use lens::LensReport;
 pub use sky::{SkyCellReport, SkyReport, ZenithReport};
-pub use star_row::{StarRow, write_table_header};
+pub use star_row::StarRow;
 pub use stars::detections;
 pub use text::{STARS_SHOWN, TextOptions};
 pub use track::TrackReport;

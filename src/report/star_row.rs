@@ -1,7 +1,7 @@
 //! The columns of a star: those of the JSON, in every table.
 
 use super::frame_report::{FrameReport, StarReport};
-use crate::base::table::{Column, columns, finished, write_row};
+use crate::base::table::{Column, TableRow, columns, csv_of};
 use std::io;
 
 /// A detection, with its frame.
@@ -15,11 +15,13 @@ pub struct StarRow {
     pub star: StarReport,
 }
 
-impl StarRow {
-    /// The columns, in their order: the fields of a star in JSON, and those of its frame. Flags are
+impl TableRow for StarRow {
+    const TABLE: &'static str = "stars";
+
+    /// The fields of a star in JSON, and those of its frame. Flags are
     /// separated by blanks; `flux_e` and `peak_e` are filled where a camera is stated. `x` and `y`
     /// count from the top of the picture, whichever `row_order` the file has.
-    pub fn columns() -> Vec<Column<Self>> {
+    fn columns() -> Vec<Column<Self>> {
         columns! {
             Self:
             frame, "", "meta.id", "name of the frame";
@@ -50,7 +52,9 @@ impl StarRow {
             row_order, "", "meta.code", "order of the rows in the file";
         }
     }
+}
 
+impl StarRow {
     /// The rows of a frame, brightest first.
     pub fn of_frame(report: &FrameReport) -> impl Iterator<Item = Self> {
         let stars = report.stars.iter();
@@ -62,36 +66,14 @@ impl StarRow {
     }
 }
 
-/// Writes the row of column names.
-///
-/// # Errors
-/// Errors of the writer.
-pub fn write_table_header<W: io::Write>(writer: &mut csv::Writer<W>) -> csv::Result<()> {
-    writer.write_record(StarRow::columns().iter().map(|column| column.name))
-}
-
 impl FrameReport {
-    /// Writes one row per detection, brightest first, without the row of column names
-    /// ([`write_table_header`]).
-    ///
-    /// # Errors
-    /// Errors of the writer.
-    pub fn write_table_rows<W: io::Write>(&self, writer: &mut csv::Writer<W>) -> csv::Result<()> {
-        let columns = StarRow::columns();
-        StarRow::of_frame(self).try_for_each(|row| write_row(writer, &columns, &row))
-    }
-
     /// The detections as a CSV table, brightest first.
     ///
     /// # Errors
     /// None for reports that [`new`](Self::new) made.
     pub fn to_csv(&self, with_header: bool) -> io::Result<String> {
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        if with_header {
-            write_table_header(&mut writer)?;
-        }
-        self.write_table_rows(&mut writer)?;
-        finished(writer)
+        let rows: Vec<StarRow> = StarRow::of_frame(self).collect();
+        csv_of(&rows, with_header)
     }
 }
 
@@ -145,11 +127,8 @@ mod tests {
         assert!(names.remove("frame") && names.remove("row_order"));
         assert_eq!(names, fields.keys().map(String::as_str).collect());
 
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        write_table_header(&mut writer).unwrap();
-        write_row(&mut writer, &columns, &row).unwrap();
-        let bytes = writer.into_inner().unwrap();
-        let mut table = csv::Reader::from_reader(&bytes[..]);
+        let text = csv_of([&row], true).unwrap();
+        let mut table = csv::Reader::from_reader(text.as_bytes());
         let heading = table.headers().unwrap().clone();
         let record = table.records().next().unwrap().unwrap();
         for (name, text) in heading.iter().zip(&record) {

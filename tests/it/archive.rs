@@ -105,7 +105,7 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     let refused = process(night, "foreign", &[]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("it is no archive"),
+        refused.stderr.contains("stars.parquet and no archive.json"),
         "{}",
         refused.stderr
     );
@@ -277,7 +277,7 @@ fn each_image_of_a_mosaic_is_a_row() {
     let told = "1 part, 4 frames: 0 identified, 4 not identified, 0 unread\n";
     assert_eq!(ran.stdout, told);
     run(directory, &["archive", "merge", "out", "--out", "tables"]);
-    let names = starpipe::archive::names_in(&directory.join("tables/frames.parquet")).unwrap();
+    let names = starpipe::store::names_in(&directory.join("tables/frames.parquet")).unwrap();
     let expected: Vec<String> = (1..=4)
         .map(|page| format!("cube.fits.fz[{page}]"))
         .collect();

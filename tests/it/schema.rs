@@ -2,9 +2,9 @@
 
 use crate::common::{Ran, fixture, number, report, starpipe};
 use serde_json::Value;
-use starpipe::archive::FrameRow;
-use starpipe::base::table::Column;
+use starpipe::base::table::{Column, TableRow};
 use starpipe::report::StarRow;
+use starpipe::store::FrameRow;
 
 /// Largest difference between a residual and the distance computed here: the report's digits.
 const SAME_PX: f64 = 2e-4;

@@ -11,8 +11,8 @@ use super::output::rows::{csv_table, json_line, json_lines};
 use super::page::HtmlOption;
 use clap::{Args, Subcommand};
 use nights::{NightLine, nights_text};
-use starpipe::archive::{Archive, ArchiveStatus, merge, status, summary};
 use starpipe::base::format::{printable, ranges};
+use starpipe::store::{Archive, ArchiveStatus, PartState, merge, status, summary};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -143,7 +143,7 @@ fn report(arguments: &ReportArgs) -> Result<CommandOutput, CommandError> {
     let archive = Archive::open(&arguments.directory)?;
     let default = || arguments.directory.join("report.html");
     let page_path = arguments.html.checked_path(&[], default)?;
-    let damaged = archive.damaged_frames();
+    let damaged: Vec<_> = archive.tables_of_frames(PartState::Damaged).collect();
     for path in &damaged {
         report_warning(format_args!(
             "{} is damaged: it is left out",

@@ -1,8 +1,8 @@
 //! The nights of an archive as text and as lines of CSV.
 
 use serde::Serialize;
-use starpipe::archive::CameraNight;
 use starpipe::base::format::{counted, printable};
+use starpipe::store::CameraNight;
 use std::fmt::Write as _;
 
 /// A night as a line of CSV: its reasons in one cell.

@@ -6,10 +6,10 @@ use crate::cli::page::{codes_note, figure, options, table, thumbnails};
 use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use serde::Serialize;
 use serde_json::Value;
-use starpipe::archive::{Archive, CameraNight, FrameSummary, frames, status};
 use starpipe::base::format::counted;
 use starpipe::base::statistics::{median, quantile};
 use starpipe::report::page::{Fact, PageContent, PageFigure};
+use starpipe::store::{Archive, CameraNight, FrameSummary, frames, status};
 use std::collections::BTreeMap;
 
 /// Points of a figure; with more frames, each is the median of several.

@@ -3,10 +3,10 @@
 use super::stdin::is_stdin;
 use crate::cli::output::messages::report;
 use anyhow::{Context, anyhow, bail};
-use starpipe::archive::names_in;
 use starpipe::base::files;
 use starpipe::base::format::counted_as;
 use starpipe::frame::{Cameras, Folder, OtherFile, PassedOver};
+use starpipe::store::names_in;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};

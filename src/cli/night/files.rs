@@ -2,23 +2,26 @@
 
 use crate::cli::output::files::NewFile;
 use crate::cli::output::rows::json_indented;
-use starpipe::archive::TableWriter;
-use starpipe::base::table::{finished, write_row};
+use starpipe::base::table::csv_of;
 use starpipe::night::{self, NightRow, NightSummary, SkyglowStation, skyglow};
+use starpipe::store::{RunFiles, TableWriter};
 use std::path::Path;
 
-/// Names of the files, beside that of the run.
-pub(super) const NAMES: [&str; 9] = [
-    ROWS,
-    "night.csv",
-    "night.parquet",
-    "night.dat",
-    "night.json",
-    "night.svg",
-    LENS,
-    PAGE,
-    HOT_PIXELS,
-];
+/// The names of all files.
+pub(super) const FILES: RunFiles = RunFiles {
+    identity: "night-run.json",
+    results: &[
+        ROWS,
+        "night.csv",
+        "night.parquet",
+        "night.dat",
+        "night.json",
+        "night.svg",
+        LENS,
+        PAGE,
+        HOT_PIXELS,
+    ],
+};
 /// The rows.
 pub(super) const ROWS: &str = "night.jsonl";
 /// The lens that was held.
@@ -27,8 +30,6 @@ pub(super) const LENS: &str = "lens.toml";
 pub(super) const PAGE: &str = "night.html";
 /// The hot pixels.
 pub(super) const HOT_PIXELS: &str = "hot-pixels.csv";
-/// Says whose the directory is.
-pub(super) const RUN: &str = "night-run.json";
 
 /// The files that are made of all rows.
 pub(super) fn of_rows(
@@ -51,17 +52,11 @@ pub(super) fn of_rows(
 
 /// The rows as CSV.
 pub(super) fn csv(rows: &[NightRow]) -> anyhow::Result<String> {
-    let columns = NightRow::columns();
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(columns.iter().map(|column| column.name))?;
-    for row in rows {
-        write_row(&mut writer, &columns, row)?;
-    }
-    Ok(finished(writer)?)
+    Ok(csv_of(rows, true)?)
 }
 
 fn parquet(rows: &[NightRow]) -> anyhow::Result<Vec<u8>> {
-    let mut writer = TableWriter::new(Vec::new(), "night", NightRow::columns())?;
+    let mut writer = TableWriter::new(Vec::new())?;
     for row in rows {
         writer.add(row.without_cells())?;
     }

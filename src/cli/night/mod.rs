@@ -16,17 +16,18 @@ pub(crate) use args::NightArgs;
 use super::exit::{CommandError, CommandOutput, Exit};
 use super::input::names::frame_names;
 use super::options::format::PageFormat;
-use super::output::files::{make_directory, write_each};
-use super::output::journal::{Journal, has_row_of};
-use super::output::messages::report_mended;
+use super::output::files::write_each;
+use super::output::messages::{report_mended, report_warning};
 use super::output::rows::json_line;
 use super::solving::SolvingPlan;
 use run::{BATCH, MeasuredNight, NightRun};
-use starpipe::archive::{self, ArchiveError, Configuration, Identity, NightConfiguration};
 use starpipe::catalog::Catalog;
 use starpipe::frame::Cameras;
 use starpipe::identify::lens::MEASURED_BY;
-use starpipe::night::{PassedOverFiles, SkyglowStation, summarize};
+use starpipe::night::{NightRow, PassedOverFiles, SkyglowStation, summarize};
+use starpipe::store::{
+    Configuration, Identity, Journal, NightConfiguration, Plan, claim, has_row_of,
+};
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -39,9 +40,12 @@ pub(crate) fn night(arguments: &NightArgs) -> Result<CommandOutput, CommandError
     let (catalog, tells) = (&arguments.catalog, !arguments.quiet);
     catalog.with_index_reporting(tells, |pool, indexed| {
         let names = order::by_date(names, pool, plan.memory);
-        let owner = claim(arguments, &plan, &names, indexed.catalog())?;
-        let (journal, kept) =
-            Journal::open(&arguments.out.join(files::ROWS), owner.text(), &names)?;
+        let owner = claim_directory(arguments, &plan, &names, indexed.catalog())?;
+        let (path, name) = (arguments.out.join(files::ROWS), |row: &NightRow| {
+            row.frame.clone()
+        });
+        let (journal, kept) = Journal::open(&path, owner.text(), &names, name)?;
+        journal.left_out().iter().for_each(report_warning);
         let run = NightRun {
             pool,
             plan: &plan,
@@ -81,41 +85,24 @@ struct Beside {
 
 /// Whether a file is a result of an earlier run of the same night.
 fn is_own_result(out: &Path, path: &Path) -> bool {
-    let names = files::NAMES.into_iter().chain([files::RUN]);
-    names
-        .map(|name| out.join(name))
-        .any(|result| result == path)
+    let mut names = files::FILES.results.iter().chain([&files::FILES.identity]);
+    names.any(|name| out.join(name) == path)
 }
 
 /// Takes the directory for this run, or goes on in it. Returns whose it is.
-fn claim(
+fn claim_directory(
     arguments: &NightArgs,
     plan: &SolvingPlan,
     names: &[String],
     catalog: &Catalog,
 ) -> Result<Identity, CommandError> {
     let directory = &arguments.out;
-    make_directory(directory)?;
-    let is_foreign =
-        |name: &&&str| directory.join(name).exists() && !directory.join(files::RUN).exists();
-    if let Some(name) = files::NAMES.iter().find(is_foreign) {
-        return Err(CommandError::usage(format_args!(
-            "{} has {name} and no {}: it is not of a night; choose another directory for --out",
-            directory.display(),
-            files::RUN
-        )));
-    }
-    let frames = archive::Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
+    let frames = Plan::new(names.to_vec(), NonZeroUsize::new(BATCH).expect("not 0"))?;
     let identity = Identity::new(&frames, &configuration(arguments, plan, catalog)?)?;
     let is_own = || is_own(directory, &identity);
-    let is_mended = archive::claim_file(directory, files::RUN, &identity, is_own);
-    let is_mended = is_mended.map_err(|error| match error {
-        ArchiveError::OtherRun { .. } | ArchiveError::Damaged { .. } => {
-            CommandError::usage(format_args!("{error}; choose another directory for --out"))
-        }
-        other => other.into(),
-    })?;
-    report_mended(is_mended.then(|| directory.join(files::RUN)).as_slice());
+    let mended = claim(directory, files::FILES, &identity, is_own);
+    let mended = mended.map_err(|error| CommandError::of_store(error, "--out"))?;
+    report_mended(mended.as_slice());
     Ok(identity)
 }
 

@@ -1,7 +1,6 @@
 //! The frames of a night, batch by batch.
 
 use crate::cli::exit::CommandError;
-use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::messages::report_error;
 use crate::cli::progress::frames_bar;
 use crate::cli::solving::{InputSolver, Inputs, Sink, SolvedImage, SolvingPlan};
@@ -11,17 +10,12 @@ use starpipe::calibration::Calibration;
 use starpipe::frame::{ImageName, PageChoice};
 use starpipe::night::{NightRow, NightStart, NoSky, PointingHistory, Probe, probe_order};
 use starpipe::solve::{Context, FixedCamera};
+use starpipe::store::Journal;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// Frames that are solved with the same pointing, whatever the number of threads.
 pub(super) const BATCH: usize = 8;
-
-impl JournalRow for NightRow {
-    fn name(&self) -> String {
-        self.frame.clone()
-    }
-}
 
 /// What a night is measured with.
 pub(super) struct NightRun<'a> {
@@ -51,7 +45,7 @@ impl<'a> NightRun<'a> {
         &self,
         names: &[String],
         start: NightStart,
-        mut journal: Journal,
+        mut journal: Journal<NightRow>,
         mut kept: Vec<Option<NightRow>>,
     ) -> Result<MeasuredNight, CommandError> {
         let progress = self.bar(names.len());
@@ -77,7 +71,7 @@ impl<'a> NightRun<'a> {
             let rows = measured.rows[done..].iter().zip(&is_lost);
             journal.add(rows.filter_map(|(row, lost)| lost.then_some(row)))?;
         }
-        journal.finish::<NightRow>()?;
+        journal.finish()?;
         progress.finish_and_clear();
         Ok(measured)
     }

@@ -4,11 +4,11 @@ use super::hints::HintOptions;
 use crate::cli::input::frames::read_master;
 use anyhow::Context as _;
 use clap::Args;
-use starpipe::archive::{Configuration, FileHash};
 use starpipe::calibration::{Calibration, read_hot_pixels};
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::catalog::Catalog;
 use starpipe::solve::SolveOptions;
+use starpipe::store::{Configuration, FileHash};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Clone, Args)]

@@ -1,7 +1,6 @@
 //! Output: results on standard output and in files, messages on standard error.
 
 pub(crate) mod files;
-pub(crate) mod journal;
 pub(crate) mod master;
 pub(crate) mod messages;
 pub(crate) mod overwrite;

@@ -8,10 +8,10 @@ use crate::cli::options::values;
 use crate::cli::solving::SolvingPlan;
 use crate::cli::solving::options::SolvingOptions;
 use clap::{Args, ValueEnum, value_parser};
-use starpipe::archive::{DEFAULT_FRAMES_PER_PART, Shard};
 use starpipe::detect::CentroidMethod;
 use starpipe::frame::PageChoice;
 use starpipe::solve::SolveOptions;
+use starpipe::store::{DEFAULT_FRAMES_PER_PART, Shard};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 

@@ -8,13 +8,11 @@ use crate::cli::progress::frames_bar;
 use crate::cli::solving::options::SolvingOptions;
 use crate::cli::solving::{InputSolver, Inputs, Sink, SolvedImage};
 use indicatif::ProgressBar;
-use starpipe::archive::{
-    Archive, ArchiveError, Configuration, FrameRow, Part, PartState, Plan, Shard,
-};
 use starpipe::base::format::counted;
 use starpipe::catalog::Catalog;
 use starpipe::frame::{Cameras, ImageName, PageChoice};
 use starpipe::report::{FrameReport, StarRow};
+use starpipe::store::{Archive, Configuration, FrameRow, Part, PartState, Plan, Shard, StoreError};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -40,7 +38,8 @@ pub(super) fn process_parts(
             page: page.and_then(text_of),
             ..calibration.configuration(indexed.catalog(), &solving.options, hints)?
         };
-        let archive = Archive::claim(directory, plan, &configuration).map_err(claim_error)?;
+        let archive = Archive::claim(directory, plan, &configuration);
+        let archive = archive.map_err(|error| CommandError::of_store(error, "--out-parquet"))?;
         report_mended(archive.mended());
         let worker = Worker(InputSolver {
             pool,
@@ -58,18 +57,6 @@ pub(super) fn process_parts(
         }
         Ok(outcome)
     })
-}
-
-/// A directory that holds something else is an error of the command line.
-fn claim_error(error: ArchiveError) -> CommandError {
-    match error {
-        ArchiveError::OtherRun { .. }
-        | ArchiveError::Foreign { .. }
-        | ArchiveError::Damaged { .. } => CommandError::Usage(format!(
-            "{error}; choose another directory for --out-parquet"
-        )),
-        other => CommandError::Failed(other.into()),
-    }
 }
 
 /// Makes rows of tables: that of the frame, and those of its stars.
@@ -137,7 +124,7 @@ impl Worker<'_> {
         part: &Part,
         progress: &ProgressBar,
         counts: &mut Counts,
-    ) -> Result<(), ArchiveError> {
+    ) -> Result<(), StoreError> {
         let mut writer = archive.write(part)?;
         let mut added = Ok(());
         self.0.solve_all(part.names, |images| {

@@ -4,10 +4,10 @@ use super::frame_table::{self, RunSummary};
 use super::options::{OutputOptions, ReportFormat};
 use crate::cli::exit::OutcomeTally;
 use crate::cli::output::stdout::print;
-use starpipe::archive::FrameRow;
 use starpipe::base::remedy::OptionNames;
-use starpipe::base::table::{finished, write_row};
+use starpipe::base::table::csv_of;
 use starpipe::report::{FrameReport, TextOptions};
+use starpipe::store::FrameRow;
 use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
 
@@ -83,20 +83,7 @@ impl Printer {
             ReportFormat::Table => frame_table::row(report),
             ReportFormat::Json => report.to_json_line()? + "\n",
             ReportFormat::Csv => report.to_csv(is_first)?,
-            ReportFormat::FramesCsv => frame_rows(row, is_first)?,
+            ReportFormat::FramesCsv => csv_of(row, is_first)?,
         })
     }
-}
-
-/// A row of the table of frames, after the names of its columns where it is the first.
-fn frame_rows(row: Option<&FrameRow>, is_first: bool) -> anyhow::Result<String> {
-    let columns = FrameRow::columns();
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    if is_first {
-        writer.write_record(columns.iter().map(|column| column.name))?;
-    }
-    if let Some(row) = row {
-        write_row(&mut writer, &columns, row)?;
-    }
-    Ok(finished(writer)?)
 }

@@ -10,7 +10,6 @@ use crate::cli::output::messages::report_error;
 use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
-use starpipe::archive::FrameRow;
 use starpipe::calibration::Calibration;
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::catalog::Catalog;
@@ -18,6 +17,7 @@ use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
 use starpipe::report::FrameReport;
 use starpipe::solve::{Context, SolveOptions};
+use starpipe::store::FrameRow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 use starpipe::lab::robustness::Answer;
-use starpipe::lab::validation::store::RunTables;
-use starpipe::lab::validation::{FrameRecord, Validator};
+use starpipe::lab::validation::{FrameRecord, RunTables, Validator};
 use starpipe::report::page::Thumbnail;
 
 /// Rows of a table on a page; frames.csv has all of them.

@@ -25,7 +25,7 @@ use super::output::rows::{json_line, json_lines};
 use super::progress::frames_bar_with_speed;
 use args::RunOptions;
 use shared::Shared;
-use starpipe::lab::validation::{HARD_SUITE, HardRow, StudyRow};
+use starpipe::lab::validation::HARD_SUITE;
 use starpipe::report::page::{PageContent, Thumbnail};
 use std::cell::Cell;
 
@@ -37,17 +37,13 @@ pub(crate) fn validate(arguments: &ValidateArgs) -> Result<CommandOutput, Comman
     if runs.is_empty() {
         return with_page(options, 1, |shared| {
             let done = run::run(&options.out, &protocol, shared)?;
-            let json = || json_line(&done.summary);
-            let text = options.format.of(|| done.summary.to_text(), json)?;
-            Ok((text, page::of_run(done)?))
+            Ok((json_line(&done.summary)?, page::of_run(done)?))
         });
     }
     with_page(options, runs.len(), |shared| {
         let (rows, failed) = study::run(&options.out, &runs, shared)?;
-        let json = || json_lines(rows.iter());
-        let text = options.format.of(|| StudyRow::to_text(&rows), json)?;
-        let camera = &protocol.setup.scenario.camera.name;
-        Ok((text, page::of_study(camera, &rows, failed)?))
+        let page = page::of_study(&protocol.setup.scenario.camera.name, &rows, failed)?;
+        Ok((json_lines(rows.iter())?, page))
     })
 }
 
@@ -57,10 +53,8 @@ pub(crate) fn hard(arguments: &HardArgs) -> Result<CommandOutput, CommandError> 
     let protocol = options.protocol(!arguments.scale_unknown)?;
     with_page(options, HARD_SUITE.len(), |shared| {
         let (rows, failed) = suite::run(&options.out, &protocol, shared)?;
-        let json = || json_lines(rows.iter());
-        let text = options.format.of(|| HardRow::to_text(&rows), json)?;
-        let camera = &protocol.setup.scenario.camera.name;
-        Ok((text, page::of_suite(camera, &rows, failed)?))
+        let page = page::of_suite(&protocol.setup.scenario.camera.name, &rows, failed)?;
+        Ok((json_lines(rows.iter())?, page))
     })
 }
 
@@ -70,15 +64,13 @@ pub(crate) fn sky(arguments: &SkyArgs) -> Result<CommandOutput, CommandError> {
     let protocol = options.protocol(true)?;
     with_page(options, 1, |shared| {
         let (summary, trials) = sky::run(&options.out, &protocol, shared)?;
-        let json = || json_line(&summary);
-        let text = options.format.of(|| summary.to_text(), json)?;
-        let camera = &protocol.setup.scenario.camera.name;
         let sheet = sky::sheet(&trials, &summary);
-        Ok((text, page::of_sky(camera, &summary, &sheet)?))
+        let page = page::of_sky(&protocol.setup.scenario.camera.name, &summary, &sheet)?;
+        Ok((json_line(&summary)?, page))
     })
 }
 
-/// Does `work`, so many runs, and writes its page if one is asked for.
+/// Does `work`, so many runs, which returns its results as JSON and as a page. Writes the page if one is asked for.
 fn with_page(
     options: &RunOptions,
     runs: usize,
@@ -96,7 +88,8 @@ fn with_page(
             progress: frames_bar_with_speed(options.count * runs as u64),
             all_written: Cell::new(true),
         };
-        let (text, page) = work(&shared)?;
+        let (json, page) = work(&shared)?;
+        let text = options.format.of(|| page.text.clone(), || Ok(json))?;
         shared.progress.finish_and_clear();
         let page = page_path.as_ref().map(|path| {
             let page = page::with_provenance(page, options.seed, indexed.catalog());

@@ -2,51 +2,27 @@
 
 use crate::cli::output::files::remove_outdated;
 use anyhow::Context;
-use starpipe::archive::TableWriter;
 use starpipe::base::files::{beside, finish, make_directory};
-use starpipe::lab::validation::store::{RunTables, StoreError};
-use starpipe::lab::validation::{FrameRecord, StarRecord, TableRow};
+use starpipe::base::table::TableRow;
+use starpipe::lab::validation::{FrameRecord, RunTables, StarRecord};
+use starpipe::store::{StoreError, TableWriter};
 use std::path::{Path, PathBuf};
 
-/// The parts in a run's directory.
-pub(super) struct ParquetParts<'a> {
-    directory: &'a Path,
-    /// Number of parts that are known to be written.
-    written: u64,
+/// Removes the part that does not have all its frames yet, and any after it.
+pub(super) fn remove_unfinished(directory: &Path, tables: &RunTables) -> anyhow::Result<()> {
+    let first = tables.whole_parts();
+    remove_parts::<FrameRecord>(directory, first)?;
+    remove_parts::<StarRecord>(directory, first)
 }
 
-impl<'a> ParquetParts<'a> {
-    pub(super) fn new(directory: &'a Path) -> Self {
-        let written = 0;
-        Self { directory, written }
+/// Writes all parts that are missing, the last one with the frames that there are.
+pub(super) fn write_parts(directory: &Path, tables: &RunTables) -> anyhow::Result<()> {
+    for part in 0..tables.parts() {
+        let (frames, stars) = tables.part(part)?;
+        write_part(directory, part, frames)?;
+        write_part(directory, part, stars)?;
     }
-
-    /// Removes the part that does not have all its frames yet, and any after it.
-    pub(super) fn remove_unfinished(&self, tables: &RunTables) -> anyhow::Result<()> {
-        let first = tables.whole_parts();
-        remove_parts::<FrameRecord>(self.directory, first)?;
-        remove_parts::<StarRecord>(self.directory, first)
-    }
-
-    /// Writes the whole parts that are missing.
-    pub(super) fn write_whole(&mut self, tables: &RunTables) -> anyhow::Result<()> {
-        self.write_up_to(tables, tables.whole_parts())
-    }
-
-    /// Writes all parts that are missing, the last one with the frames that there are.
-    pub(super) fn write_all(&mut self, tables: &RunTables) -> anyhow::Result<()> {
-        self.write_up_to(tables, tables.parts())
-    }
-
-    fn write_up_to(&mut self, tables: &RunTables, end: u64) -> anyhow::Result<()> {
-        for part in self.written..end {
-            let (frames, stars) = tables.part(part)?;
-            write_part(self.directory, part, frames)?;
-            write_part(self.directory, part, stars)?;
-        }
-        self.written = end;
-        Ok(())
-    }
+    Ok(())
 }
 
 fn part_path<R: TableRow>(directory: &Path, part: u64) -> PathBuf {
@@ -66,7 +42,7 @@ fn write_part<R: TableRow>(
     }
     let write = || -> anyhow::Result<()> {
         path.parent().map_or(Ok(()), make_directory)?;
-        let mut table = TableWriter::new(beside(&path)?, R::TABLE, R::columns())?;
+        let mut table = TableWriter::new(beside(&path)?)?;
         for row in rows {
             table.add(row?)?;
         }

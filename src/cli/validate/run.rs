@@ -2,7 +2,7 @@
 
 use super::figures;
 use super::frames::RunFrames;
-use super::parquet::ParquetParts;
+use super::parquet::{remove_unfinished, write_parts};
 use super::shared::Shared;
 use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
@@ -10,10 +10,10 @@ use crate::cli::output::files::remove_outdated;
 use crate::cli::output::rows::json_indented;
 use serde::Serialize;
 use starpipe::lab::StudyError;
-use starpipe::lab::validation::store::{
-    FRAMES_PER_PART, FrameLines, RunTables, StoreError, claim_directory,
+use starpipe::lab::validation::{
+    FRAMES_PER_PART, FrameLines, RunTables, ValidationProtocol, ValidationSummary, Validator,
+    claim_directory,
 };
-use starpipe::lab::validation::{ValidationProtocol, ValidationSummary, Validator};
 use starpipe::solve::Workspace;
 use std::path::Path;
 use std::time::Instant;
@@ -50,7 +50,8 @@ pub(super) fn run(
         StudyError::Scenario(_) | StudyError::NoLimit => CommandError::usage(error),
         other => CommandError::Failed(other.into()),
     })?;
-    claim_directory(directory, protocol, shared.indexed.catalog()).map_err(claim_error)?;
+    claim_directory(directory, protocol, shared.indexed.catalog())
+        .map_err(|error| CommandError::of_store(error, "--out"))?;
     let mut tables = RunTables::open(directory, |number| validator.draw(number).0)?;
     let done = tables.done();
     if done > shared.frames {
@@ -60,13 +61,12 @@ pub(super) fn run(
             shared.frames
         )));
     }
-    let mut parts = ParquetParts::new(directory);
     shared.progress.inc(done);
     shared.progress.reset_eta();
     if done < shared.frames {
-        complete(directory, &validator, &mut tables, &mut parts, shared)?;
+        complete(directory, &validator, &mut tables, shared)?;
     }
-    parts.write_all(&tables)?;
+    write_parts(directory, &tables)?;
     let summary = tables.summary(validator.facts(), validator.limit_vmag())?;
     save(directory, &summary, shared)?;
     let frames = match shared.pictures {
@@ -76,22 +76,11 @@ pub(super) fn run(
     Ok(ValidationRun { summary, frames })
 }
 
-/// A directory that holds something else is an error of the command line.
-pub(super) fn claim_error(error: StoreError) -> CommandError {
-    match error {
-        StoreError::OtherRun { .. } | StoreError::UnknownRun { .. } => {
-            CommandError::Usage(format!("{error}; choose another directory for --out"))
-        }
-        other => CommandError::Failed(other.into()),
-    }
-}
-
 /// Simulates and processes the missing frames, and reports how long it took.
 fn complete(
     directory: &Path,
     validator: &Validator,
     tables: &mut RunTables,
-    parts: &mut ParquetParts,
     shared: &Shared,
 ) -> anyhow::Result<()> {
     let done = tables.done();
@@ -102,8 +91,8 @@ fn complete(
     for name in RESULTS {
         remove_outdated(&directory.join(name))?;
     }
-    parts.remove_unfinished(tables)?;
-    let timing = simulate(validator, tables, parts, shared)?;
+    remove_unfinished(directory, tables)?;
+    let timing = simulate(directory, validator, tables, shared)?;
     let text = json_indented(&timing)?;
     shared.write(directory, [("timing.json", text)], Vec::new());
     shared.report(format_args!(
@@ -115,9 +104,9 @@ fn complete(
 
 /// Simulates and processes the missing frames, part by part, and adds them to the tables.
 fn simulate(
+    directory: &Path,
     validator: &Validator,
     tables: &mut RunTables,
-    parts: &mut ParquetParts,
     shared: &Shared,
 ) -> anyhow::Result<RunTiming> {
     let start = Instant::now();
@@ -127,7 +116,7 @@ fn simulate(
     };
     while tables.done() < shared.frames {
         simulate_part(validator, tables, shared, &mut timing)?;
-        parts.write_whole(tables)?;
+        write_parts(directory, tables)?;
     }
     let frames = timing.frames as f64;
     timing.wall_s = start.elapsed().as_secs_f64();

@@ -3,26 +3,20 @@
 use super::shared::Shared;
 use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
-use crate::cli::output::journal::{Journal, JournalRow};
+use crate::cli::output::messages::report_warning;
 use crate::cli::output::rows::{csv_table, json_indented};
 use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use starpipe::ephemeris::observer::Site;
 use starpipe::lab::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
-use starpipe::lab::validation::ValidationProtocol;
-use starpipe::lab::validation::store::claim_directory;
+use starpipe::lab::validation::{ValidationProtocol, claim_directory};
 use starpipe::solve::Workspace;
+use starpipe::store::Journal;
 use std::path::Path;
 
 /// Where the frames are taken.
 const SITE_DEG_M: [f64; 3] = [50.0, 10.0, 300.0];
 /// The rows of all frames, as they are made.
 const ROWS: &str = "frames.jsonl";
-
-impl JournalRow for SkyTrial {
-    fn name(&self) -> String {
-        self.frame.frame.to_string()
-    }
-}
 
 /// Measures the frames that `directory` lacks, and writes tables of all.
 pub(super) fn run(
@@ -37,7 +31,7 @@ pub(super) fn run(
         ..base.clone()
     };
     claim_directory(directory, &protocol, shared.indexed.catalog())
-        .map_err(super::run::claim_error)?;
+        .map_err(|error| CommandError::of_store(error, "--out"))?;
     let study = SkyStudy {
         indexed: shared.indexed,
         setup: protocol.setup,
@@ -47,8 +41,9 @@ pub(super) fn run(
     let numbers: Vec<String> = (0..shared.frames)
         .map(|number| number.to_string())
         .collect();
-    let (mut journal, mut trials) =
-        Journal::open::<SkyTrial>(&directory.join(ROWS), ROWS, &numbers)?;
+    let name = |trial: &SkyTrial| trial.frame.frame.to_string();
+    let (mut journal, mut trials) = Journal::open(&directory.join(ROWS), ROWS, &numbers, name)?;
+    journal.left_out().iter().for_each(report_warning);
     let left: Vec<u64> = (0..shared.frames)
         .zip(&trials)
         .filter_map(|(number, made)| made.is_none().then_some(number))
@@ -63,7 +58,7 @@ pub(super) fn run(
         trials[*number as usize] = Some(trial);
         Ok(())
     })?;
-    journal.finish::<SkyTrial>()?;
+    journal.finish()?;
     let trials: Vec<SkyTrial> = trials.into_iter().flatten().collect();
     let summary = SkySummary::of(&trials);
     save(directory, &trials, &summary, shared)?;

@@ -114,24 +114,23 @@ impl Repeats {
         common: &CommonError,
         of_stars: &[Vec<StarError>],
     ) -> Vec<Vec<f64>> {
-        let mut means = vec![MeanResidual::default(); self.place_count()];
+        let mut sums = vec![ResidualSums::default(); self.place_count()];
         let stars = of_stars.iter().zip(&self.places);
         for (star, place) in stars
             .clone()
             .flat_map(|(stars, places)| stars.iter().zip(places))
         {
-            means[*place].add(star, star.in_common(common));
+            sums[*place].add(star, star.in_common(common));
         }
-        let sigma_px = |star: &StarError, mean: &MeanResidual| {
-            let others = mean.observations - 1.0;
+        let sigma_px = |star: &StarError, place: usize| {
+            let observations = self.observations[place] as f64;
+            let others = observations - 1.0;
             let variance_px2 = star.sigma_px * star.sigma_px + others * star.in_common(common);
-            (variance_px2 + mean.observations * mean.excess_px2()).sqrt()
+            (variance_px2 + observations * sums[place].excess_px2(observations)).sqrt()
         };
         let of_frame = |(stars, places): (&Vec<StarError>, &Vec<usize>)| {
             let stars = stars.iter().zip(places);
-            stars
-                .map(|(star, place)| sigma_px(star, &means[*place]))
-                .collect()
+            stars.map(|(star, place)| sigma_px(star, *place)).collect()
         };
         stars.map(of_frame).collect()
     }
@@ -157,19 +156,17 @@ impl StarError {
     }
 }
 
-/// The mean residual at a place.
+/// Sums over the observations at a place.
 #[derive(Debug, Clone, Copy, Default)]
-struct MeanResidual {
-    observations: f64,
+struct ResidualSums {
     residuals_px: [f64; 2],
-    /// Sums of the variances of the observations, and of what is in common.
+    /// Of the variances of the observations, and of what is in common.
     variances_px2: f64,
     common_px2: f64,
 }
 
-impl MeanResidual {
+impl ResidualSums {
     fn add(&mut self, star: &StarError, common_px2: f64) {
-        self.observations += 1.0;
         self.variances_px2 += star.sigma_px * star.sigma_px;
         self.common_px2 += common_px2;
         for (sum, along) in self.residuals_px.iter_mut().zip(star.residual_px) {
@@ -178,14 +175,14 @@ impl MeanResidual {
     }
 
     /// The variance that the mean of an outlier has beyond the usual one: all frames repeat it.
-    fn excess_px2(&self) -> f64 {
-        if self.observations < 2.0 {
+    fn excess_px2(&self, observations: f64) -> f64 {
+        if observations < 2.0 {
             return 0.0;
         }
-        let [common_px2, single_px2] = [self.common_px2, self.variances_px2 - self.common_px2]
-            .map(|sum| sum / self.observations);
-        let variance_px2 = common_px2 + single_px2 / self.observations;
-        let [x, y] = self.residuals_px.map(|sum| sum / self.observations);
+        let [common_px2, single_px2] =
+            [self.common_px2, self.variances_px2 - self.common_px2].map(|sum| sum / observations);
+        let variance_px2 = common_px2 + single_px2 / observations;
+        let [x, y] = self.residuals_px.map(|sum| sum / observations);
         huber_sigma(variance_px2.sqrt(), libm::hypot(x, y)).powi(2) - variance_px2
     }
 }

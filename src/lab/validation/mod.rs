@@ -27,7 +27,8 @@ mod evaluation;
 mod light;
 mod parameter_study;
 mod record;
-pub mod store;
+mod run_identity;
+mod run_tables;
 mod suite;
 mod summary;
 mod text;
@@ -36,7 +37,9 @@ mod validator;
 
 pub use light::LightMap;
 pub use parameter_study::{StudyParameter, StudyRow};
-pub use record::{BEYOND_LIMIT_MAG, FrameRecord, NameResult, RowKind, StarRecord, TableRow};
+pub use record::{BEYOND_LIMIT_MAG, FrameRecord, NameResult, RowKind, StarRecord};
+pub use run_identity::claim_directory;
+pub use run_tables::{FRAMES_PER_PART, FrameLines, RunTables};
 pub use suite::{HARD_SUITE, HardCase, HardRow};
 pub use summary::{
     Accumulator, AttitudeSummary, CentroidBin, CentroidSummary, CompletenessBin,

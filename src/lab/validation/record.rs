@@ -3,48 +3,17 @@
 //! Lengths are in pixels, light in electrons, angles in the unit in their name. Missing values are
 //! empty.
 
-use crate::base::table::{Column, columns, field};
+use crate::base::table::{field, table_row};
 use crate::lab::robustness::Answer;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 /// Magnitudes beyond the predicted limit down to which the table of stars goes.
 pub const BEYOND_LIMIT_MAG: f64 = 1.5;
 
-/// A row of a table.
-pub trait TableRow: Sized + Serialize + DeserializeOwned {
-    /// The table's name.
-    const TABLE: &'static str;
-
-    /// Its columns: the fields of the row, in their order.
-    fn columns() -> Vec<Column<Self>>;
-}
-
-/// A row of the table `$table`: each field with its unit, UCD and description.
-macro_rules! table_row {
-    ($(#[$attribute:meta])* $row:ident in $table:literal {
-        $($field:ident: $type:ty, $unit:literal, $ucd:literal, $description:literal;)*
-    }) => {
-        $(#[$attribute])*
-        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-        pub struct $row {$(
-            #[doc = $description]
-            pub $field: $type,
-        )*}
-
-        impl TableRow for $row {
-            const TABLE: &'static str = $table;
-
-            fn columns() -> Vec<Column<Self>> {
-                columns! { Self: $($field, $unit, $ucd, $description;)* }
-            }
-        }
-    };
-}
-
 table_row! {
     /// A simulated frame, and the result of the pipeline. Errors of the attitude, of the focal length and of the
     /// zero point are of right answers only.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
     FrameRecord in "frames" {
         frame: u64, "", "meta.id;meta.main", "number of the frame, from 0";
         seed: u64, "", "", "seed of the random numbers in its pixels";
@@ -94,6 +63,7 @@ table_row! {
 table_row! {
     /// A true star, down to [`BEYOND_LIMIT_MAG`] below the predicted limit; or a detection that is no
     /// such star.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
     StarRecord in "stars" {
         frame: u64, "", "meta.id", "number of the frame";
         kind: RowKind, "", "meta.code.class", "star, blend or false";

@@ -12,6 +12,7 @@ mod fits_table;
 pub mod votable;
 
 use super::{FrameReport, StarRow};
+use crate::base::table::TableRow;
 use crate::solve::Solution;
 
 /// The kind of a table.

@@ -124,7 +124,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "report",
         ],
     ),
-    ("archive", &["base", "catalog", "solve", "report"]),
+    ("store", &["base", "catalog", "solve", "report"]),
     (
         "lab",
         &[
@@ -142,6 +142,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "centroids",
             "solve",
             "night",
+            "store",
         ],
     ),
 ];

@@ -2,67 +2,68 @@
 
 use crate::base::coords::{Camera, Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
-use crate::base::table::{Column, columns};
+use crate::base::table::table_row;
 use crate::base::units::DEG_PER_RAD;
 use crate::report::FrameReport;
 use crate::solve::{Outcome, Solution};
 
-/// A frame, as its report has it; `t_min`, `s_fov` and `s_region` are columns of ObsCore.
-///
-/// There are no run times: the same frames make the same rows. A text is empty where there is none.
-///
-/// # Reference
-/// Louys et al. 2017, ObsCore 1.1, IVOA recommendation.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[expect(missing_docs, reason = "`columns` has unit and description of each")]
-pub struct FrameRow {
-    pub frame: String,
-    pub status: String,
-    pub reason_code: String,
-    pub reason: String,
-    pub night: String,
-    pub t_min: Option<f64>,
-    pub exposure_s: Option<f64>,
-    pub camera: String,
-    pub width: Option<u64>,
-    pub height: Option<u64>,
-    pub row_order: String,
-    pub ra_deg: Option<f64>,
-    pub dec_deg: Option<f64>,
-    pub s_fov: Option<f64>,
-    pub s_region: String,
-    pub up_pa_deg: Option<f64>,
-    pub qw: Option<f64>,
-    pub qx: Option<f64>,
-    pub qy: Option<f64>,
-    pub qz: Option<f64>,
-    pub sigma_x_arcsec: Option<f64>,
-    pub sigma_y_arcsec: Option<f64>,
-    pub sigma_roll_arcsec: Option<f64>,
-    pub covariance_x_y_arcsec2: Option<f64>,
-    pub covariance_x_roll_arcsec2: Option<f64>,
-    pub covariance_y_roll_arcsec2: Option<f64>,
-    pub fov_x_deg: Option<f64>,
-    pub fov_y_deg: Option<f64>,
-    pub focal_length_px: Option<f64>,
-    pub mirrored: bool,
-    pub detected: Option<u64>,
-    pub matched: Option<u64>,
-    pub rms_px: Option<f64>,
-    pub log10_false_alarm: Option<f64>,
-    pub background: Option<f64>,
-    pub noise: Option<f64>,
-    pub zero_point_vmag: Option<f64>,
-    pub zero_point_sigma_mag: Option<f64>,
-    pub limit50_vmag: Option<f64>,
-    pub limit50_sigma_mag: Option<f64>,
-    pub predicted_limit50_vmag: Option<f64>,
-    pub limit_difference_mag: Option<f64>,
-    pub faintest_vmag: Option<f64>,
-    pub sky_mag_arcsec2: Option<f64>,
-    pub airmass: Option<f64>,
-    pub notes: String,
-    pub star_rows: u64,
+table_row! {
+    /// A frame, as its report has it; `t_min`, `s_fov` and `s_region` are columns of ObsCore.
+    ///
+    /// There are no run times: the same frames make the same rows. A text is empty where there is none.
+    ///
+    /// # Reference
+    /// Louys et al. 2017, ObsCore 1.1, IVOA recommendation.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    FrameRow in "frames" {
+        frame: String, "", "meta.id;meta.main", "name of the frame";
+        status: String, "", "meta.code.status", "identified, not_identified or unread";
+        reason_code: String, "", "meta.code", "why it is not identified, as a code";
+        reason: String, "", "meta.note", "why it is not identified";
+        night: String, "", "time.epoch", "date of the evening before, in local mean time where the site is known";
+        t_min: Option<f64>, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
+        exposure_s: Option<f64>, "s", "time.duration;obs.exposure", "exposure";
+        camera: String, "", "meta.id;instr", "the stated camera";
+        width: Option<u64>, "pix", "", "columns of the frame";
+        height: Option<u64>, "pix", "", "rows of the frame";
+        row_order: String, "", "meta.code", "order of the rows in the file; pixels count from the top of the picture in either";
+        ra_deg: Option<f64>, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
+        dec_deg: Option<f64>, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
+        s_fov: Option<f64>, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
+        s_region: String, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
+        up_pa_deg: Option<f64>, "deg", "pos.posAng", "position angle of the picture's up direction";
+        qw: Option<f64>, "", "", "quaternion that turns ICRS vectors into camera axes, w";
+        qx: Option<f64>, "", "", "the same, x";
+        qy: Option<f64>, "", "", "the same, y";
+        qz: Option<f64>, "", "", "the same, z";
+        sigma_x_arcsec: Option<f64>, "arcsec", "stat.error;pos", "standard error of the rotation about the x axis";
+        sigma_y_arcsec: Option<f64>, "arcsec", "stat.error;pos", "standard error of the rotation about the y axis";
+        sigma_roll_arcsec: Option<f64>, "arcsec", "stat.error;pos.posAng", "standard error of the rotation about the boresight";
+        covariance_x_y_arcsec2: Option<f64>, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x and y axes";
+        covariance_x_roll_arcsec2: Option<f64>, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x axis and the boresight";
+        covariance_y_roll_arcsec2: Option<f64>, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the y axis and the boresight";
+        fov_x_deg: Option<f64>, "deg", "phys.angSize;instr.fov", "horizontal field of view";
+        fov_y_deg: Option<f64>, "deg", "phys.angSize;instr.fov", "vertical field of view";
+        focal_length_px: Option<f64>, "pix", "instr.param", "focal length over pixel pitch";
+        mirrored: bool, "", "meta.code", "whether an identified frame mirrors the sky";
+        detected: Option<u64>, "", "meta.number", "detections";
+        matched: Option<u64>, "", "meta.number", "detections with the name of a star";
+        rms_px: Option<f64>, "pix", "stat.fit.residual", "RMS residual of the named stars";
+        log10_false_alarm: Option<f64>, "", "stat.probability", "log10 of the false-alarm probability";
+        background: Option<f64>, "", "instr.background", "median background, in units of the frame";
+        noise: Option<f64>, "", "stat.stdev;instr.background", "noise of a pixel, in units of the frame";
+        zero_point_vmag: Option<f64>, "mag", "phot.mag;arith.zp", "V magnitude of a star that gives 1 unit, a second where the exposure is known";
+        zero_point_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;arith.zp", "standard error of the zero point";
+        limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
+        limit50_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limit";
+        predicted_limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;meta.modelled", "the limit that the stated camera should reach";
+        limit_difference_mag: Option<f64>, "mag", "phot.mag;arith.diff", "measured minus predicted limit";
+        faintest_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude of the faintest named star";
+        sky_mag_arcsec2: Option<f64>, "mag/arcsec**2", "phot.mag.sb;em.opt.V", "sky brightness";
+        airmass: Option<f64>, "", "obs.airMass", "airmass of the centre";
+        notes: String, "", "meta.note", "codes of what is odd about the frame";
+        star_rows: u64, "", "meta.number", "rows of the frame in the table of stars";
+    }
 }
 
 /// Status of a frame that could not be read or searched.
@@ -180,60 +181,6 @@ impl FrameRow {
                 _ => circle(&direction(&UnitVector::BORESIGHT), 0.5 * diameter_deg),
             },
             ..self
-        }
-    }
-
-    /// The columns of the table `frames`.
-    pub fn columns() -> Vec<Column<Self>> {
-        columns! {
-            Self:
-            frame, "", "meta.id;meta.main", "name of the frame";
-            status, "", "meta.code.status", "identified, not_identified or unread";
-            reason_code, "", "meta.code", "why it is not identified, as a code";
-            reason, "", "meta.note", "why it is not identified";
-            night, "", "time.epoch", "date of the evening before, in local mean time where the site is known";
-            t_min, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
-            exposure_s, "s", "time.duration;obs.exposure", "exposure";
-            camera, "", "meta.id;instr", "the stated camera";
-            width, "pix", "", "columns of the frame";
-            height, "pix", "", "rows of the frame";
-            row_order, "", "meta.code", "order of the rows in the file; pixels count from the top of the picture in either";
-            ra_deg, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
-            dec_deg, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
-            s_fov, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
-            s_region, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
-            up_pa_deg, "deg", "pos.posAng", "position angle of the picture's up direction";
-            qw, "", "", "quaternion that turns ICRS vectors into camera axes, w";
-            qx, "", "", "the same, x";
-            qy, "", "", "the same, y";
-            qz, "", "", "the same, z";
-            sigma_x_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the x axis";
-            sigma_y_arcsec, "arcsec", "stat.error;pos", "standard error of the rotation about the y axis";
-            sigma_roll_arcsec, "arcsec", "stat.error;pos.posAng", "standard error of the rotation about the boresight";
-            covariance_x_y_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x and y axes";
-            covariance_x_roll_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the x axis and the boresight";
-            covariance_y_roll_arcsec2, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the y axis and the boresight";
-            fov_x_deg, "deg", "phys.angSize;instr.fov", "horizontal field of view";
-            fov_y_deg, "deg", "phys.angSize;instr.fov", "vertical field of view";
-            focal_length_px, "pix", "instr.param", "focal length over pixel pitch";
-            mirrored, "", "meta.code", "whether an identified frame mirrors the sky";
-            detected, "", "meta.number", "detections";
-            matched, "", "meta.number", "detections with the name of a star";
-            rms_px, "pix", "stat.fit.residual", "RMS residual of the named stars";
-            log10_false_alarm, "", "stat.probability", "log10 of the false-alarm probability";
-            background, "", "instr.background", "median background, in units of the frame";
-            noise, "", "stat.stdev;instr.background", "noise of a pixel, in units of the frame";
-            zero_point_vmag, "mag", "phot.mag;arith.zp", "V magnitude of a star that gives 1 unit, a second where the exposure is known";
-            zero_point_sigma_mag, "mag", "stat.error;phot.mag;arith.zp", "standard error of the zero point";
-            limit50_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
-            limit50_sigma_mag, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limit";
-            predicted_limit50_vmag, "mag", "phot.mag;em.opt.V;meta.modelled", "the limit that the stated camera should reach";
-            limit_difference_mag, "mag", "phot.mag;arith.diff", "measured minus predicted limit";
-            faintest_vmag, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude of the faintest named star";
-            sky_mag_arcsec2, "mag/arcsec**2", "phot.mag.sb;em.opt.V", "sky brightness";
-            airmass, "", "obs.airMass", "airmass of the centre";
-            notes, "", "meta.note", "codes of what is odd about the frame";
-            star_rows, "", "meta.number", "rows of the frame in the table of stars";
         }
     }
 }

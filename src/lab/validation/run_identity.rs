@@ -1,23 +1,21 @@
 //! `run.json`: which run a directory holds, by all that its tables depend on.
 
-use super::error::StoreError;
-use crate::base::differences::differences;
-use crate::base::files;
+use super::ValidationProtocol;
 use crate::camera::data_sheet::Response;
 use crate::catalog::Catalog;
 use crate::lab::simulate::SetupParameter;
-use crate::lab::validation::ValidationProtocol;
 use crate::predict::Reading;
+use crate::store::{CatalogIdentity, Identity, RunFiles, StoreError, claim};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-const FILE: &str = "run.json";
+const FILES: RunFiles = RunFiles {
+    identity: "run.json",
+    results: &["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"],
+};
 /// Version of the tables and of `run.json`.
 const SCHEMA: u32 = 3;
-/// Files that a run writes.
-const TABLES: [&str; 4] = ["frames.csv", "stars.csv", "frames.parquet", "stars.parquet"];
 
 #[derive(Serialize)]
 struct RunIdentity<'a> {
@@ -35,60 +33,24 @@ struct RunIdentity<'a> {
     /// Wavelengths in nm and values, if it is a curve.
     lens_transmission_curve: Option<&'a [(f64, f64)]>,
     quantum_efficiency_curve: Option<&'a [(f64, f64)]>,
-    catalog: RunCatalog<'a>,
-}
-
-#[derive(Serialize)]
-struct RunCatalog<'a> {
-    title: &'a str,
-    stars: usize,
-    checksum: String,
+    catalog: CatalogIdentity,
 }
 
 /// Makes `directory` that of a run. One that already holds this very run is continued.
 ///
 /// # Errors
-/// [`StoreError::OtherRun`], [`StoreError::UnknownRun`], [`StoreError::File`],
-/// [`StoreError::Json`].
+/// As for [`claim`].
 pub fn claim_directory(
     directory: &Path,
     protocol: &ValidationProtocol,
     catalog: &Catalog,
 ) -> Result<(), StoreError> {
-    std::fs::create_dir_all(directory)
-        .map_err(StoreError::file("making the directory", directory))?;
-    let path = directory.join(FILE);
-    let json_error = |source| StoreError::Json {
-        path: path.clone(),
-        source,
-    };
-    let wanted = identity(protocol, catalog).map_err(json_error)?;
-    let text = match std::fs::read_to_string(&path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            refuse_unknown_tables(directory)?;
-            return write(&path, &wanted).map_err(StoreError::file("writing", &path));
-        }
-        read => read.map_err(StoreError::file("reading", &path))?,
-    };
-    let found: Value = serde_json::from_str(&text).map_err(json_error)?;
-    let differences = differences(&found, &wanted);
-    if differences.is_empty() {
-        return Ok(());
-    }
-    Err(StoreError::OtherRun {
-        directory: directory.to_owned(),
-        differences: differences.join(", "),
-    })
-}
-
-fn write(path: &Path, identity: &Value) -> io::Result<()> {
-    let mut file = files::beside(path)?;
-    file.write_all(format!("{identity:#}\n").as_bytes())?;
-    file.persist(path)?;
+    // A damaged `run.json` is refused: nothing in the tables tells whose they are.
+    claim(directory, FILES, &identity(protocol, catalog)?, || false)?;
     Ok(())
 }
 
-fn identity(protocol: &ValidationProtocol, catalog: &Catalog) -> Result<Value, serde_json::Error> {
+fn identity(protocol: &ValidationProtocol, catalog: &Catalog) -> Result<Identity, StoreError> {
     let scenario = &protocol.setup.scenario;
     let imperfections = &scenario.camera.imperfections;
     let parameters = SetupParameter::all().filter_map(|parameter| {
@@ -111,31 +73,15 @@ fn identity(protocol: &ValidationProtocol, catalog: &Catalog) -> Result<Value, s
         parameters: parameters.collect(),
         lens_transmission_curve: curve(&scenario.camera.lens_transmission),
         quantum_efficiency_curve: curve(&scenario.camera.quantum_efficiency),
-        catalog: RunCatalog {
-            title: catalog.title(),
-            stars: catalog.stars().len(),
-            checksum: format!("{:016x}", catalog.checksum()),
-        },
+        catalog: catalog.into(),
     };
-    // Written and read, so that numbers have the same digits as those of a file.
-    serde_json::from_str(&serde_json::to_string(&identity)?)
+    Identity::unsealed(&identity)
 }
 
 fn curve(response: &Response) -> Option<&[(f64, f64)]> {
     match response {
         Response::Table(points) => Some(points),
         Response::Constant(_) => None,
-    }
-}
-
-/// Tables of an unknown run must not be overwritten.
-fn refuse_unknown_tables(directory: &Path) -> Result<(), StoreError> {
-    match TABLES.iter().find(|name| directory.join(name).exists()) {
-        Some(&name) => Err(StoreError::UnknownRun {
-            directory: directory.to_owned(),
-            name,
-        }),
-        None => Ok(()),
     }
 }
 
@@ -170,19 +116,5 @@ mod tests {
             message.contains("exposure_s is 0.1 there and 0.7 here, seed is 18446744073709551615 there and 1 here"),
             "{message}"
         );
-    }
-
-    #[test]
-    fn tables_of_an_unknown_run_are_left_alone() {
-        let directory = tempfile::tempdir().unwrap();
-        std::fs::write(directory.path().join("stars.csv"), "").unwrap();
-        let error = refuse_unknown_tables(directory.path()).unwrap_err();
-        assert!(matches!(
-            error,
-            StoreError::UnknownRun {
-                name: "stars.csv",
-                ..
-            }
-        ));
     }
 }

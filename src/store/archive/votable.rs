@@ -43,6 +43,7 @@ fn size(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::table::TableRow;
     use crate::report::StarRow;
 
     #[test]

@@ -1,9 +1,9 @@
 //! How far an archive is.
 
-use super::directory::{Archive, PartState};
-use super::error::ArchiveError;
 use super::frame_row::UNREAD;
-use super::read::{for_each_row, open, text};
+use super::frames::FrameSummary;
+use super::parts::{Archive, PartState};
+use crate::store::error::StoreError;
 use serde::Serialize;
 
 /// How far an archive is.
@@ -50,8 +50,8 @@ impl ArchiveStatus {
 /// How far `archive` is.
 ///
 /// # Errors
-/// [`ArchiveError::File`], [`ArchiveError::Table`] for a part that is not what was written.
-pub fn status(archive: &Archive) -> Result<ArchiveStatus, ArchiveError> {
+/// [`StoreError::File`], [`StoreError::Table`] for a part that is not what was written.
+pub fn status(archive: &Archive) -> Result<ArchiveStatus, StoreError> {
     let plan = archive.plan();
     let mut status = ArchiveStatus {
         parts: plan.parts().len(),
@@ -70,23 +70,17 @@ pub fn status(archive: &Archive) -> Result<ArchiveStatus, ArchiveError> {
         }
         status.parts_done += 1;
         status.files_done += part.names.len();
-        let columns = ["frame", "status", "reason"];
-        let path = archive.frames_of(&part);
-        let read = for_each_row(open(&path)?, &columns, |row| {
+        FrameSummary::for_each_in(&archive.frames_of(&part), |frame| {
             status.frames += 1;
-            match text(row, "status") {
+            match frame.status.as_str() {
                 "identified" => status.identified += 1,
-                UNREAD => {
-                    let cell = |name| text(row, name).to_owned();
-                    status.unread.push(UnreadFrame {
-                        frame: cell("frame"),
-                        reason: cell("reason"),
-                    });
-                }
+                UNREAD => status.unread.push(UnreadFrame {
+                    frame: frame.frame,
+                    reason: frame.reason,
+                }),
                 _ => status.not_identified += 1,
             }
-        });
-        read.map_err(ArchiveError::table("reading", &path))?;
+        })?;
     }
     Ok(status)
 }

@@ -1,12 +1,13 @@
 //! Both tables of a run, frame by frame.
+//!
+//! `frames.csv` and `stars.csv` get the rows of one frame after the other, in order. After an interruption they are
+//! cut back to the last frame that both have whole.
 
-use super::error::StoreError;
-use super::rows::RowReader;
-use super::table::CsvTable;
-use crate::lab::validation::record::{FrameRecord, StarRecord};
-use crate::lab::validation::summary::{Accumulator, RunFacts, ValidationSummary};
+use super::record::{FrameRecord, StarRecord};
+use super::summary::{Accumulator, RunFacts, ValidationSummary};
+use crate::store::{CsvTable, RowReader, StoreError, lock};
 use serde::Serialize;
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::Path;
 
 /// Frames in a part of the tables.
@@ -61,7 +62,7 @@ impl RunTables {
     /// [`StoreError::Locked`], [`StoreError::Changed`], [`StoreError::File`].
     pub fn open(directory: &Path, seed_of: impl Fn(u64) -> u64) -> Result<Self, StoreError> {
         let mut tables = Self {
-            _lock: lock(directory)?,
+            _lock: lock_file(directory)?,
             frames: CsvTable::open(directory)?,
             stars: CsvTable::open(directory)?,
             done: 0,
@@ -194,12 +195,9 @@ fn skip_stars(stars: &mut RowReader<StarRecord>, frame: &FrameRecord) -> Result<
     Ok(true)
 }
 
-fn lock(directory: &Path) -> Result<File, StoreError> {
+fn lock_file(directory: &Path) -> Result<File, StoreError> {
     let path = directory.join("run.lock");
     let file = File::create(&path).map_err(StoreError::file("locking", &path))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::Locked(directory.to_owned())),
-        Err(TryLockError::Error(error)) => Err(StoreError::file("locking", &path)(error)),
-    }
+    lock(&file, directory)?;
+    Ok(file)
 }

@@ -1,33 +1,17 @@
 //! How faint did each camera see in each night?
 
-use super::directory::Archive;
-use super::error::ArchiveError;
 use super::frame_row::UNREAD;
-use super::read::{for_each_row, number, open, text};
+use super::frames::FrameSummary;
+use super::parts::{Archive, PartState};
+use super::read::open;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::statistics::median_of;
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::store::error::StoreError;
 use parquet::errors::ParquetError;
 use parquet::file::reader::ChunkReader;
-use parquet::record::Row;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// The columns that the summary needs.
-const COLUMNS: [&str; 12] = [
-    "status",
-    "reason_code",
-    "night",
-    "t_min",
-    "camera",
-    "ra_deg",
-    "dec_deg",
-    "zero_point_vmag",
-    "limit50_vmag",
-    "predicted_limit50_vmag",
-    "limit_difference_mag",
-    "sky_mag_arcsec2",
-];
 
 /// What one camera saw in one night. Values are medians over its frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -84,9 +68,9 @@ impl Nights {
     /// # Errors
     /// [`ParquetError`] if it is no such table.
     pub fn add(&mut self, part: impl ChunkReader + 'static) -> Result<(), ParquetError> {
-        for_each_row(part, &COLUMNS, |row| {
-            let key = ["night", "camera"].map(|name| text(row, name).to_owned());
-            self.0.entry(key).or_default().add(row);
+        FrameSummary::for_each(part, |frame| {
+            let key = [frame.night.clone(), frame.camera.clone()];
+            self.0.entry(key).or_default().add(frame);
         })
     }
 
@@ -105,42 +89,36 @@ impl Nights {
 /// What each camera saw in each night, by night and camera, in the parts that are whole.
 ///
 /// # Errors
-/// [`ArchiveError::File`], [`ArchiveError::Table`].
-pub fn summary(archive: &Archive) -> Result<Vec<CameraNight>, ArchiveError> {
+/// [`StoreError::File`], [`StoreError::Table`].
+pub fn summary(archive: &Archive) -> Result<Vec<CameraNight>, StoreError> {
     let mut nights = Nights::default();
-    for part in archive.parts_with_frames() {
-        let path = archive.frames_of(&part);
+    for path in archive.tables_of_frames(PartState::Whole) {
         let added = nights.add(open(&path)?);
-        added.map_err(ArchiveError::table("reading", &path))?;
+        added.map_err(StoreError::table("reading", &path))?;
     }
     Ok(nights.finish())
 }
 
 impl Night {
-    fn add(&mut self, row: &Row) {
+    fn add(&mut self, frame: FrameSummary) {
         let summary = &mut self.summary;
         summary.frames += 1;
-        match text(row, "status") {
+        match frame.status.as_str() {
             "identified" => summary.identified += 1,
             UNREAD => summary.unread += 1,
             _ => {}
         }
-        let code = text(row, "reason_code");
-        if !code.is_empty() {
-            *summary.reasons.entry(code.to_owned()).or_default() += 1;
+        if !frame.reason_code.is_empty() {
+            *summary.reasons.entry(frame.reason_code).or_default() += 1;
         }
-        let values = [
-            (&mut self.limits, "limit50_vmag"),
-            (&mut self.predicted, "predicted_limit50_vmag"),
-            (&mut self.differences, "limit_difference_mag"),
-            (&mut self.skies, "sky_mag_arcsec2"),
-            (&mut self.zero_points, "zero_point_vmag"),
-        ];
-        for (values, column) in values {
-            values.extend(number(row, column));
-        }
-        let [t_min, ra_deg, dec_deg] = ["t_min", "ra_deg", "dec_deg"].map(|name| number(row, name));
-        if let (Some(t_min), Some(ra_deg), Some(dec_deg)) = (t_min, ra_deg, dec_deg) {
+        self.limits.extend(frame.limit50_vmag);
+        self.predicted.extend(frame.predicted_limit50_vmag);
+        self.differences.extend(frame.limit_difference_mag);
+        self.skies.extend(frame.sky_mag_arcsec2);
+        self.zero_points.extend(frame.zero_point_vmag);
+        if let (Some(t_min), Some(ra_deg), Some(dec_deg)) =
+            (frame.t_min, frame.ra_deg, frame.dec_deg)
+        {
             let turned_rad = ra_deg * RAD_PER_DEG - earth_rotation_rad(t_min);
             let direction = UnitVector::from_ra_dec(turned_rad, dec_deg * RAD_PER_DEG);
             self.pointings.push((t_min, direction));

@@ -1,17 +1,16 @@
-//! Why an archive cannot be used.
+//! Why results of a run cannot be used.
 
-use parquet::errors::ParquetError;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why an archive cannot be used.
+/// Why results of a run cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ArchiveError {
+pub enum StoreError {
     /// There are no frames.
     #[error("there are no frames")]
     NoFrames,
-    /// The directory has results of other frames or another configuration.
+    /// The directory belongs to another run.
     #[error("{} holds another run: {differences}", .directory.display())]
     OtherRun {
         /// The directory.
@@ -19,20 +18,35 @@ pub enum ArchiveError {
         /// What differs.
         differences: String,
     },
-    /// The directory has files that are not an archive's.
-    #[error("{} has {name} and no archive.json: it is no archive", .directory.display())]
-    Foreign {
+    /// The directory has results of an unknown run.
+    #[error("{} has {name} and no {file}, which would tell what run it is of", .directory.display())]
+    UnknownRun {
         /// The directory.
         directory: PathBuf,
-        /// Name of the file.
+        /// Name of the result.
         name: &'static str,
+        /// Name of the file that is missing.
+        file: &'static str,
+    },
+    /// A file that says whose the directory is was changed since it was written.
+    #[error("{} is damaged; the command that wrote the directory writes it anew, if results show that they are its own", .0.display())]
+    Damaged(PathBuf),
+    /// Another process writes the results.
+    #[error("another run is writing {}", .0.display())]
+    Locked(PathBuf),
+    /// A table has other content than this run would write.
+    #[error("{}, line {line}: {problem}; the table was changed: remove the directory to begin anew", .path.display())]
+    Changed {
+        /// The table.
+        path: PathBuf,
+        /// Number of the line, from 1.
+        line: u64,
+        /// What was found and what was expected.
+        problem: String,
     },
     /// There is no archive in the directory.
     #[error("{} has no archive.json: no archive has begun in it", .0.display())]
     NoArchive(PathBuf),
-    /// A file that says whose the directory is was changed since it was written.
-    #[error("{} is damaged; the command that wrote the directory writes it anew, if results show that they are its own", .0.display())]
-    Damaged(PathBuf),
     /// Parts are missing or damaged.
     #[error("{missing} of {parts} parts are missing or damaged in {}: see `starpipe archive status`", .directory.display())]
     Unfinished {
@@ -57,6 +71,7 @@ pub enum ArchiveError {
         source: io::Error,
     },
     /// A table could not be read or written.
+    #[cfg(feature = "archive")]
     #[error("{action} {}", .path.display())]
     Table {
         /// What was done to it.
@@ -64,23 +79,27 @@ pub enum ArchiveError {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: ParquetError,
+        source: parquet::errors::ParquetError,
     },
-    /// A file of the archive is not what was written.
-    #[error("reading {}", .path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// The error of the parser.
-        source: serde_json::Error,
-    },
+    /// A value could not be written as JSON.
+    #[error("writing JSON")]
+    Json(#[from] serde_json::Error),
+    /// A row could not be written as CSV.
+    #[error("writing a row of a table")]
+    Row(#[from] csv::Error),
 }
 
-impl ArchiveError {
-    pub(super) fn file<'p>(
-        action: &'static str,
-        path: &'p Path,
-    ) -> impl FnOnce(io::Error) -> Self + use<'p> {
+impl StoreError {
+    /// Whether the directory holds something else than this run: another one would do.
+    pub fn is_of_directory(&self) -> bool {
+        matches!(
+            self,
+            Self::OtherRun { .. } | Self::UnknownRun { .. } | Self::Damaged(_)
+        )
+    }
+
+    /// A function that adds what was done to which file to an error of the system.
+    pub(crate) fn file(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self::File {
             action,
             path: path.to_owned(),
@@ -88,19 +107,14 @@ impl ArchiveError {
         }
     }
 
-    pub(super) fn table<'p>(
+    /// The same for an error of Parquet.
+    #[cfg(feature = "archive")]
+    pub(super) fn table(
         action: &'static str,
-        path: &'p Path,
-    ) -> impl Fn(ParquetError) -> Self + use<'p> {
+        path: &Path,
+    ) -> impl Fn(parquet::errors::ParquetError) -> Self {
         move |source| Self::Table {
             action,
-            path: path.to_owned(),
-            source,
-        }
-    }
-
-    pub(super) fn json<'p>(path: &'p Path) -> impl FnOnce(serde_json::Error) -> Self + use<'p> {
-        move |source| Self::Json {
             path: path.to_owned(),
             source,
         }

@@ -1,6 +1,6 @@
 //! Which frames are in which part, and which parts are whose.
 
-use super::error::ArchiveError;
+use super::error::StoreError;
 use std::num::NonZeroUsize;
 use std::str::FromStr;
 use xxhash_rust::xxh3::xxh3_64;
@@ -65,15 +65,12 @@ impl Plan {
     /// Sorts the names, leaves out repeated ones, and cuts them into parts.
     ///
     /// # Errors
-    /// [`ArchiveError::NoFrames`].
-    pub fn new(
-        mut names: Vec<String>,
-        frames_per_part: NonZeroUsize,
-    ) -> Result<Self, ArchiveError> {
+    /// [`StoreError::NoFrames`].
+    pub fn new(mut names: Vec<String>, frames_per_part: NonZeroUsize) -> Result<Self, StoreError> {
         names.sort_unstable();
         names.dedup();
         if names.is_empty() {
-            return Err(ArchiveError::NoFrames);
+            return Err(StoreError::NoFrames);
         }
         Ok(Self {
             names,
@@ -103,8 +100,8 @@ impl Plan {
     }
 
     /// Hash of all names.
-    pub(super) fn hash(&self) -> u64 {
-        hash_of(&self.names)
+    pub(super) fn names_hash(&self) -> String {
+        format!("{:016x}", hash_of(&self.names))
     }
 }
 
@@ -138,7 +135,7 @@ mod tests {
         let plan = Plan::new(names, DEFAULT_FRAMES_PER_PART).unwrap();
         assert_eq!(plan.names(), ["a", "b"]);
         let none = Plan::new(vec![], DEFAULT_FRAMES_PER_PART);
-        assert!(matches!(none, Err(ArchiveError::NoFrames)));
+        assert!(matches!(none, Err(StoreError::NoFrames)));
     }
 
     #[test]

@@ -2,66 +2,71 @@
 //!
 //! Each row has a checksum. A row that was changed since is not taken, and its frame is done again.
 
-use super::messages::report_warning;
-use super::rows::json_line;
-use anyhow::{Context, bail};
+use super::claim::lock;
+use super::error::StoreError;
+use crate::base::files;
+use crate::base::format::{counted, json_escaped, ranges};
+use crate::base::sealed::{is_intact, sealed};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use starpipe::base::files;
-use starpipe::base::format::{counted, ranges};
-use starpipe::base::sealed::{is_intact, sealed};
 use std::collections::HashMap;
-use std::fs::{File, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A row of a frame.
-pub(crate) trait JournalRow: Serialize + DeserializeOwned {
-    /// Name of the frame.
-    fn name(&self) -> String;
-}
-
 /// The file of rows, locked as long as it is open.
-pub(crate) struct Journal {
+pub struct Journal<Row> {
     path: PathBuf,
     file: File,
     /// What this file was written anew for: its lock keeps other runs away that have opened it.
     replaced: Option<File>,
-    /// Whose rows they are: all that they depend on.
-    owner: String,
-    frames: Vec<String>,
+    rows: RowsOf<Row>,
     is_in_order: bool,
+    left_out: Vec<String>,
 }
 
-impl Journal {
+/// Which rows are those of a run.
+struct RowsOf<Row> {
+    /// All that they depend on.
+    owner: String,
+    /// Names of the frames.
+    frames: Vec<String>,
+    /// Name of a row's frame.
+    name: fn(&Row) -> String,
+}
+
+impl<Row: Serialize + DeserializeOwned> Journal<Row> {
     /// Opens the file of the run `owner` over `frames`, and returns it with the rows that are in it, in the order
-    /// of the frames. What is no such row is told and left out. A file that another run writes is refused.
-    pub(crate) fn open<Row: JournalRow>(
+    /// of the frames; `name` is the frame of a row. What is no such row is left out. A file that another run writes is
+    /// refused.
+    ///
+    /// # Errors
+    /// [`StoreError::Locked`], [`StoreError::File`].
+    pub fn open(
         path: &Path,
         owner: &str,
         frames: &[String],
-    ) -> anyhow::Result<(Self, Vec<Option<Row>>)> {
-        let open = File::options()
-            .create(true)
-            .read(true)
-            .append(true)
-            .open(path);
-        let file = open.with_context(|| format!("writing {}", path.display()))?;
-        // Where the file system has no locks, nothing is known of other runs.
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            bail!("{}: another run is writing it", path.display());
-        }
+        name: fn(&Row) -> String,
+    ) -> Result<(Self, Vec<Option<Row>>), StoreError> {
+        let mut options = File::options();
+        let open = options.create(true).read(true).append(true).open(path);
+        let file = open.map_err(StoreError::file("writing", path))?;
+        lock(&file, path)?;
         let mut journal = Self {
             path: path.to_owned(),
             file,
             replaced: None,
-            owner: owner.to_owned(),
-            frames: frames.to_vec(),
+            rows: RowsOf {
+                owner: owner.to_owned(),
+                frames: frames.to_vec(),
+                name,
+            },
             is_in_order: true,
+            left_out: Vec::new(),
         };
         let text = journal.text()?;
-        let found = Lines::<Row>::parse(&text, owner, frames);
-        found.tell(path);
+        let found = journal.rows.lines(&text);
+        journal.left_out = found.left_out(path);
         let kept = found.kept_text();
         if kept != text {
             journal.rewrite(&kept)?;
@@ -70,49 +75,63 @@ impl Journal {
         Ok((journal, found.rows))
     }
 
+    /// What the file had that is no row of the run, in words.
+    pub fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+
     /// Adds rows.
-    pub(crate) fn add<'r, Row: JournalRow + 'r>(
-        &mut self,
-        rows: impl IntoIterator<Item = &'r Row>,
-    ) -> anyhow::Result<()> {
-        let line = |row| Ok(sealed(&json_line(row)?, &self.owner) + "\n");
-        let text: String = rows.into_iter().map(line).collect::<anyhow::Result<_>>()?;
+    ///
+    /// # Errors
+    /// [`StoreError::Json`], [`StoreError::File`].
+    pub fn add<'r>(&mut self, rows: impl IntoIterator<Item = &'r Row>) -> Result<(), StoreError>
+    where
+        Row: 'r,
+    {
+        let line = |row| {
+            let text = json_escaped(serde_json::to_string(row)?);
+            Ok(sealed(&text, &self.rows.owner) + "\n")
+        };
+        let lines: Result<String, StoreError> = rows.into_iter().map(line).collect();
+        let text = lines?;
         if text.is_empty() {
             return Ok(());
         }
         let written = self.file.write_all(text.as_bytes());
         let written = written.and_then(|()| self.file.sync_data());
-        written.with_context(|| format!("writing {}", self.path.display()))
+        written.map_err(StoreError::file("writing", &self.path))
     }
 
     /// Puts the rows in the order of the frames, where they are not.
-    pub(crate) fn finish<Row: JournalRow>(mut self) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// [`StoreError::File`].
+    pub fn finish(mut self) -> Result<(), StoreError> {
         if self.is_in_order {
             return Ok(());
         }
         let text = self.text()?;
-        let kept = Lines::<Row>::parse(&text, &self.owner, &self.frames).kept_text();
+        let kept = self.rows.lines(&text).kept_text();
         self.rewrite(&kept)
     }
 
-    fn text(&mut self) -> anyhow::Result<Vec<u8>> {
+    fn text(&mut self) -> Result<Vec<u8>, StoreError> {
         let mut text = Vec::new();
         let read = self.file.seek(SeekFrom::Start(0));
         let read = read.and_then(|_| self.file.read_to_end(&mut text));
-        read.with_context(|| format!("reading {}", self.path.display()))?;
+        read.map_err(StoreError::file("reading", &self.path))?;
         Ok(text)
     }
 
     /// Writes the file anew: it has this text, or the old one.
-    fn rewrite(&mut self, text: &[u8]) -> anyhow::Result<()> {
+    fn rewrite(&mut self, text: &[u8]) -> Result<(), StoreError> {
         let write = || {
             let mut file = files::beside(&self.path)?;
             file.write_all(text)?;
             file.as_file().sync_all()?;
             file.persist(&self.path).map_err(|refused| refused.error)
         };
-        let written: io::Result<File> = write();
-        let written = written.with_context(|| format!("writing {}", self.path.display()))?;
+        let written = write().map_err(StoreError::file("writing", &self.path))?;
         let before = std::mem::replace(&mut self.file, written);
         self.replaced.get_or_insert(before);
         Ok(())
@@ -130,16 +149,13 @@ struct Lines<'t, Row> {
     surplus: Vec<usize>,
 }
 
-impl<'t, Row: JournalRow> Lines<'t, Row> {
-    fn parse(text: &'t [u8], owner: &str, frames: &[String]) -> Self {
-        let places: HashMap<&str, usize> = frames
-            .iter()
-            .enumerate()
-            .map(|(at, name)| (name.as_str(), at))
-            .collect();
-        let mut found = Self {
-            kept: vec![None; frames.len()],
-            rows: frames.iter().map(|_| None).collect(),
+impl<Row: DeserializeOwned> RowsOf<Row> {
+    fn lines<'t>(&self, text: &'t [u8]) -> Lines<'t, Row> {
+        let names = self.frames.iter().enumerate();
+        let places: HashMap<&str, usize> = names.map(|(at, name)| (name.as_str(), at)).collect();
+        let mut found = Lines {
+            kept: vec![None; self.frames.len()],
+            rows: self.frames.iter().map(|_| None).collect(),
             damaged: Vec::new(),
             surplus: Vec::new(),
         };
@@ -148,11 +164,11 @@ impl<'t, Row: JournalRow> Lines<'t, Row> {
             if line.is_empty() {
                 continue;
             }
-            let Some(row) = row_of::<Row>(line, owner) else {
+            let Some(row) = row_of::<Row>(line, &self.owner) else {
                 found.damaged.push(number);
                 continue;
             };
-            match places.get(row.name().as_str()) {
+            match places.get((self.name)(&row).as_str()) {
                 Some(&at) if found.rows[at].is_none() => {
                     found.kept[at] = Some(line);
                     found.rows[at] = Some(row);
@@ -162,17 +178,21 @@ impl<'t, Row: JournalRow> Lines<'t, Row> {
         }
         found
     }
+}
 
-    /// Says what is left out.
-    fn tell(&self, path: &Path) {
-        let warn = |lines: &[usize], what: &str| {
-            if !lines.is_empty() {
-                let (path, count) = (path.display(), counted(lines.len(), "line"));
-                report_warning(format_args!("{path}: {count} {what}: {}", ranges(lines)));
-            }
+impl<Row> Lines<'_, Row> {
+    /// What is left out, in words.
+    fn left_out(&self, path: &Path) -> Vec<String> {
+        let parts = [
+            (&self.damaged, "damaged, whose frames are done again"),
+            (&self.surplus, "of other frames, or repeated, left out"),
+        ];
+        let parts = parts.into_iter().filter(|(lines, _)| !lines.is_empty());
+        let text = |(lines, what): (&Vec<usize>, _)| {
+            let (path, count) = (path.display(), counted(lines.len(), "line"));
+            format!("{path}: {count} {what}: {}", ranges(lines))
         };
-        warn(&self.damaged, "damaged, whose frames are done again");
-        warn(&self.surplus, "of other frames, or repeated, left out");
+        parts.map(text).collect()
     }
 
     /// The rows as they are written.
@@ -192,13 +212,13 @@ impl<'t, Row: JournalRow> Lines<'t, Row> {
 }
 
 /// Whether a row of the run `owner` is in a file of this text.
-pub(crate) fn has_row_of(text: &[u8], owner: &str) -> bool {
+pub fn has_row_of(text: &[u8], owner: &str) -> bool {
     let mut lines = text.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
     lines.any(|line| std::str::from_utf8(line).is_ok_and(|line| is_intact(line, owner)))
 }
 
 /// The row in a line, if it is what was written.
-fn row_of<Row: JournalRow>(line: &[u8], owner: &str) -> Option<Row> {
+fn row_of<Row: DeserializeOwned>(line: &[u8], owner: &str) -> Option<Row> {
     let line = std::str::from_utf8(line).ok()?;
     if !is_intact(line, owner) {
         return None;
@@ -209,10 +229,12 @@ fn row_of<Row: JournalRow>(line: &[u8], owner: &str) -> Option<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use starpipe::night::NightRow;
+    use crate::night::NightRow;
     use std::fs;
 
     const OWNER: &str = "a run";
+
+    type Opened = (Journal<NightRow>, Vec<Option<NightRow>>);
 
     struct Night {
         directory: tempfile::TempDir,
@@ -234,7 +256,7 @@ mod tests {
             let (mut journal, none) = night.open();
             assert!(none.iter().all(Option::is_none));
             journal.add(&night.rows).unwrap();
-            journal.finish::<NightRow>().unwrap();
+            journal.finish().unwrap();
             night.whole = fs::read(night.path()).unwrap();
             night
         }
@@ -243,8 +265,12 @@ mod tests {
             self.directory.path().join("night.jsonl")
         }
 
-        fn open(&self) -> (Journal, Vec<Option<NightRow>>) {
-            Journal::open(&self.path(), OWNER, &self.names).unwrap()
+        fn open(&self) -> Opened {
+            self.try_open(OWNER, &self.names).unwrap()
+        }
+
+        fn try_open(&self, owner: &str, names: &[String]) -> Result<Opened, StoreError> {
+            Journal::open(&self.path(), owner, names, |row| row.frame.clone())
         }
 
         /// Goes on with a file of this text, of which the frames `lost` are done again.
@@ -263,7 +289,7 @@ mod tests {
             let (mut journal, kept) = self.open();
             assert_eq!(kept.iter().flatten().count(), 7 - left.len());
             journal.add(left.map(|at| &self.rows[*at])).unwrap();
-            journal.finish::<NightRow>().unwrap();
+            journal.finish().unwrap();
             assert!(fs::read(self.path()).unwrap() == self.whole);
         }
 
@@ -323,7 +349,7 @@ mod tests {
     #[test]
     fn rows_of_another_run_or_of_other_values_are_not_taken() {
         let night = Night::new();
-        let other = Journal::open::<NightRow>(&night.path(), "another", &night.names);
+        let other = night.try_open("another", &night.names);
         assert!(other.unwrap().1.iter().all(Option::is_none));
         let text = String::from_utf8(night.lines().concat()).unwrap();
         let renamed = text.replace("é2.fits", "é3.fits");
@@ -331,7 +357,7 @@ mod tests {
         let changed = text.replacen("\"trails\":null", "\"trails\":1e300", 2);
         night.repair(changed.as_bytes(), &[0, 1]);
         fs::write(night.path(), &night.whole).unwrap();
-        let fewer = Journal::open::<NightRow>(&night.path(), OWNER, &night.names[1..]);
+        let fewer = night.try_open(OWNER, &night.names[1..]);
         assert_eq!(fewer.unwrap().1.iter().flatten().count(), 6);
     }
 
@@ -339,7 +365,7 @@ mod tests {
     fn a_file_that_another_run_writes_is_refused() {
         let night = Night::new();
         let held = night.open();
-        let second = Journal::open::<NightRow>(&night.path(), OWNER, &night.names);
+        let second = night.try_open(OWNER, &night.names);
         let second = second.err().unwrap().to_string();
         assert!(second.contains("another run"), "{second}");
         drop(held);

@@ -1,7 +1,7 @@
 //! Writes a table as Parquet, group after group of rows.
 
 use super::votable::{CONTENT_KEY, VERSION, VERSION_KEY, votable};
-use crate::base::table::{Column, FieldValue};
+use crate::base::table::{Column, FieldValue, TableRow};
 use parquet::basic::Compression;
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -19,7 +19,6 @@ const ROWS_PER_GROUP: usize = 1 << 16;
 
 /// Writes rows to a file. The same rows make the same bytes.
 pub struct TableWriter<R, W: Write + Send> {
-    table: String,
     columns: Vec<Column<R>>,
     /// Characters of the longest text of each column.
     widths: Vec<usize>,
@@ -28,18 +27,18 @@ pub struct TableWriter<R, W: Write + Send> {
     rows: Vec<R>,
 }
 
-impl<R, W: Write + Send> TableWriter<R, W> {
-    /// A table of this name with these columns.
+impl<R: TableRow, W: Write + Send> TableWriter<R, W> {
+    /// Begins a table.
     ///
     /// # Errors
     /// [`ParquetError`] if the beginning cannot be written.
-    pub fn new(target: W, table: &str, columns: Vec<Column<R>>) -> Result<Self> {
-        let schema = Arc::new(parse_message_type(&schema(table, &columns))?);
+    pub fn new(target: W) -> Result<Self> {
+        let columns = R::columns();
+        let schema = Arc::new(parse_message_type(&schema(R::TABLE, &columns))?);
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
             .build();
         Ok(Self {
-            table: table.to_owned(),
             writer: SerializedFileWriter::new(target, schema, Arc::new(properties))?,
             widths: vec![0; columns.len()],
             columns,
@@ -67,7 +66,7 @@ impl<R, W: Write + Send> TableWriter<R, W> {
         if !self.rows.is_empty() {
             self.write_group()?;
         }
-        let content = votable(&self.table, &self.columns, &self.widths);
+        let content = votable(R::TABLE, &self.columns, &self.widths);
         describe(&mut self.writer, content);
         self.writer.into_inner()
     }
@@ -124,26 +123,32 @@ fn write_column(
     is_optional: bool,
     fields: Vec<FieldValue>,
 ) -> Result<usize> {
-    let level = |field: &FieldValue| i16::from(!is_empty(field));
     // Definition levels: 1 for a value, 0 for an empty field.
+    let level = |field: &FieldValue| i16::from(!field.is_empty());
     let levels: Option<Vec<i16>> = is_optional.then(|| fields.iter().map(level).collect());
     let levels = levels.as_deref();
-    let fields = fields.into_iter();
+    /// The values of a column of this kind.
+    macro_rules! values {
+        ($kind:ident) => {{
+            let value = |field| match field {
+                FieldValue::$kind(value) => value,
+                _ => None,
+            };
+            fields.into_iter().filter_map(value)
+        }};
+    }
     match writer {
         ColumnWriter::Int64ColumnWriter(typed) => {
-            let values: Vec<i64> = fields.filter_map(integer).collect();
-            typed.write_batch(&values, levels, None)?;
+            typed.write_batch(&values!(Integer).collect::<Vec<_>>(), levels, None)?;
         }
         ColumnWriter::DoubleColumnWriter(typed) => {
-            let values: Vec<f64> = fields.filter_map(number).collect();
-            typed.write_batch(&values, levels, None)?;
+            typed.write_batch(&values!(Number).collect::<Vec<_>>(), levels, None)?;
         }
         ColumnWriter::BoolColumnWriter(typed) => {
-            let values: Vec<bool> = fields.filter_map(boolean).collect();
-            typed.write_batch(&values, levels, None)?;
+            typed.write_batch(&values!(Bool).collect::<Vec<_>>(), levels, None)?;
         }
         ColumnWriter::ByteArrayColumnWriter(typed) => {
-            let texts: Vec<String> = fields.filter_map(FieldValue::into_text).collect();
+            let texts: Vec<String> = values!(Text).collect();
             let longest = texts.iter().map(|text| text.chars().count()).max();
             let bytes = texts.into_iter().map(String::into_bytes);
             let values: Vec<ByteArray> = bytes.map(ByteArray::from).collect();
@@ -156,35 +161,4 @@ fn write_column(
         }
     }
     Ok(0)
-}
-
-fn is_empty(field: &FieldValue) -> bool {
-    matches!(
-        field,
-        FieldValue::Integer(None)
-            | FieldValue::Number(None)
-            | FieldValue::Bool(None)
-            | FieldValue::Text(None)
-    )
-}
-
-fn integer(field: FieldValue) -> Option<i64> {
-    match field {
-        FieldValue::Integer(value) => value,
-        _ => None,
-    }
-}
-
-fn number(field: FieldValue) -> Option<f64> {
-    match field {
-        FieldValue::Number(value) => value,
-        _ => None,
-    }
-}
-
-fn boolean(field: FieldValue) -> Option<bool> {
-    match field {
-        FieldValue::Bool(value) => value,
-        _ => None,
-    }
 }

@@ -1,7 +1,8 @@
 //! Reading the rows of a table.
 
 use super::error::StoreError;
-use crate::lab::validation::record::TableRow;
+use crate::base::table::TableRow;
+use serde::de::DeserializeOwned;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Take};
 use std::marker::PhantomData;
@@ -20,7 +21,7 @@ pub struct RowReader<R> {
     rows: PhantomData<R>,
 }
 
-impl<R: TableRow> RowReader<R> {
+impl<R: TableRow + DeserializeOwned> RowReader<R> {
     /// The rows of the table at `path` between two byte offsets, the first on `first_line`.
     pub(super) fn open(
         path: &Path,
@@ -50,12 +51,12 @@ impl<R: TableRow> RowReader<R> {
     }
 
     /// Offset of the end of the last row read, in bytes.
-    pub(super) fn end(&self) -> u64 {
+    pub(crate) fn end(&self) -> u64 {
         self.start + self.reader.position().byte()
     }
 
     /// An error of the last row read.
-    pub(super) fn changed(&self, problem: String) -> StoreError {
+    pub(crate) fn changed(&self, problem: String) -> StoreError {
         StoreError::Changed {
             path: self.path.clone(),
             line: self.line,
@@ -89,7 +90,7 @@ impl<R: TableRow> RowReader<R> {
     }
 }
 
-impl<R: TableRow> Iterator for RowReader<R> {
+impl<R: TableRow + DeserializeOwned> Iterator for RowReader<R> {
     type Item = Result<R, StoreError>;
 
     fn next(&mut self) -> Option<Self::Item> {

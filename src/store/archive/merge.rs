@@ -1,13 +1,12 @@
 //! One file of each table, of all parts.
 
-use super::directory::{Archive, PartState};
-use super::error::ArchiveError;
-use super::guard::guarded;
-use super::plan::Part;
-use super::read::open;
+use super::parts::{Archive, PartState};
+use super::read::{open, reader};
 use super::votable::{CONTENT_KEY, widened};
 use super::write::describe;
 use crate::base::files;
+use crate::store::error::StoreError;
+use crate::store::plan::Part;
 use parquet::column::writer::ColumnCloseResult;
 use parquet::errors::Result;
 use parquet::file::metadata::RowGroupMetaData;
@@ -23,14 +22,14 @@ use std::sync::Arc;
 /// Rows are in the order of the frames' names; they are copied as they are.
 ///
 /// # Errors
-/// [`ArchiveError::Unfinished`] if parts are missing or damaged, [`ArchiveError::File`],
-/// [`ArchiveError::Table`].
-pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2], ArchiveError> {
+/// [`StoreError::Unfinished`] if parts are missing or damaged, [`StoreError::File`],
+/// [`StoreError::Table`].
+pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2], StoreError> {
     let parts: Vec<_> = archive.plan().parts().collect();
     let is_missing = |part: &&Part<'_>| archive.state(part) != PartState::Whole;
     let missing = parts.iter().filter(is_missing).count();
     if missing > 0 {
-        return Err(ArchiveError::Unfinished {
+        return Err(StoreError::Unfinished {
             directory: archive.directory().to_owned(),
             missing,
             parts: parts.len(),
@@ -44,15 +43,13 @@ pub fn merge(archive: &Archive, out: &Path) -> std::result::Result<[PathBuf; 2],
     Ok(targets)
 }
 
-fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), ArchiveError> {
-    let failed = ArchiveError::table("writing", target);
+fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), StoreError> {
+    let failed = StoreError::table("writing", target);
     let mut writer = None;
     let mut votable: Option<String> = None;
     for path in parts {
         let source = open(path)?;
-        let file = open(path)?;
-        let reader = guarded(|| SerializedFileReader::new(file));
-        let reader = reader.map_err(ArchiveError::table("reading", path))?;
+        let reader = reader(open(path)?).map_err(StoreError::table("reading", path))?;
         if let Some(of_part) = votable_of(&reader) {
             votable = Some(match votable {
                 Some(before) => widened(&before, of_part),
@@ -62,7 +59,7 @@ fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), Arch
         let writer = match &mut writer {
             Some(writer) => writer,
             none => {
-                let file = files::beside(target).map_err(ArchiveError::file("writing", target))?;
+                let file = files::beside(target).map_err(StoreError::file("writing", target))?;
                 none.insert(begin(file, &reader).map_err(&failed)?)
             }
         };
@@ -77,7 +74,7 @@ fn concatenate(parts: &[PathBuf], target: &Path) -> std::result::Result<(), Arch
         describe(&mut writer, votable);
     }
     let written = writer.into_inner().map_err(&failed)?;
-    files::finish(written, target).map_err(ArchiveError::file("writing", target))
+    files::finish(written, target).map_err(StoreError::file("writing", target))
 }
 
 /// The VOTable in the metadata of a part.

@@ -1,15 +1,16 @@
 //! One table as a CSV file that grows.
 
+use super::csv_rows::RowReader;
 use super::error::StoreError;
-use super::rows::RowReader;
-use crate::lab::validation::record::TableRow;
+use crate::base::table::TableRow;
+use serde::de::DeserializeOwned;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A table, open for writing at its end.
-pub(super) struct CsvTable<R> {
+pub(crate) struct CsvTable<R> {
     path: PathBuf,
     file: File,
     /// Bytes up to the end of the last whole row.
@@ -17,9 +18,9 @@ pub(super) struct CsvTable<R> {
     rows: PhantomData<R>,
 }
 
-impl<R: TableRow> CsvTable<R> {
+impl<R: TableRow + DeserializeOwned> CsvTable<R> {
     /// Opens the table in `directory`, or makes an empty one.
-    pub(super) fn open(directory: &Path) -> Result<Self, StoreError> {
+    pub(crate) fn open(directory: &Path) -> Result<Self, StoreError> {
         let path = directory.join(format!("{}.csv", R::TABLE));
         let (file, length) =
             open_file(&path, &heading::<R>()).map_err(StoreError::file("opening", &path))?;
@@ -32,12 +33,12 @@ impl<R: TableRow> CsvTable<R> {
     }
 
     /// Bytes up to the end of the last whole row.
-    pub(super) fn length(&self) -> u64 {
+    pub(crate) fn length(&self) -> u64 {
         self.length
     }
 
     /// All whole rows.
-    pub(super) fn rows(&self) -> Result<RowReader<R>, StoreError> {
+    pub(crate) fn rows(&self) -> Result<RowReader<R>, StoreError> {
         let heading = heading::<R>();
         let mut first = vec![0; heading.len()];
         let mut file = File::open(&self.path).map_err(StoreError::file("reading", &self.path))?;
@@ -54,12 +55,12 @@ impl<R: TableRow> CsvTable<R> {
     }
 
     /// The rows between two byte offsets.
-    pub(super) fn rows_between(&self, bounds: [u64; 2]) -> Result<RowReader<R>, StoreError> {
+    pub(crate) fn rows_between(&self, bounds: [u64; 2]) -> Result<RowReader<R>, StoreError> {
         RowReader::open(&self.path, bounds, 1)
     }
 
     /// Removes all after `length` bytes.
-    pub(super) fn cut(&mut self, length: u64) -> Result<(), StoreError> {
+    pub(crate) fn cut(&mut self, length: u64) -> Result<(), StoreError> {
         self.length = length;
         self.file
             .set_len(length)
@@ -69,7 +70,7 @@ impl<R: TableRow> CsvTable<R> {
     }
 
     /// Adds whole lines.
-    pub(super) fn add(&mut self, lines: &[u8]) -> Result<(), StoreError> {
+    pub(crate) fn add(&mut self, lines: &[u8]) -> Result<(), StoreError> {
         self.length += lines.len() as u64;
         let written = self.file.write_all(lines);
         written.map_err(StoreError::file("writing", &self.path))
