@@ -43,6 +43,8 @@ mod _starpipe {
     #[pymodule_export]
     use super::lens::calibrate;
     #[pymodule_export]
+    use super::options::check_options;
+    #[pymodule_export]
     use super::pages::{Page, Pages, read_page};
     #[pymodule_export]
     use super::picture::{picture, write_file};

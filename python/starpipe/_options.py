@@ -6,22 +6,19 @@ import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict, TypeVar
 
+from . import _starpipe
 from ._hints import (
-    NAME_ODDS,
-    RADIUS_DEG,
     air_at_site,
     direction,
     header_date,
     header_exposure,
     iso_date,
+    number,
     pixel_angle,
-    positive,
+    site,
     utc_offset_text,
     velocity_km_s,
-    whole_number,
-    within,
 )
-from ._hints import site as geodetic
 
 if TYPE_CHECKING:
     import datetime
@@ -122,68 +119,60 @@ class SolveOptions(TypedDict, total=False):
     time_limit: Quantity | float | None
 
 
-def solve_options(
-    header: Any = None,
-    *,
-    fov: Any = None,
-    pixel_scale: Any = None,
-    scale_error: Any = 10.0,
-    near: Any = None,
-    radius: Any = RADIUS_DEG,
-    date: Any = None,
-    utc_offset: Any = None,
-    site: Any = None,
-    air: Any = None,
-    velocity: Any = None,
-    frame_of: Any = "icrs",
-    exposure: Any = None,
-    zenith_distance: Any = None,
-    extinction: Any = None,
-    sigma: Any = None,
-    false_alarms: Any = None,
-    max_stars: Any = None,
-    centroid: Any = None,
-    name_odds: Any = NAME_ODDS,
-    effort: Any = "normal",
-    refine_lens: bool = False,
-    attitude_only: bool = False,
-    sky: bool = False,
-    trails: bool = False,
-    time_limit: Any = None,
-) -> dict[str, Any]:
+_UNITS = {
+    "fov": "deg",
+    "scale_error": "percent",
+    "radius": "deg",
+    "exposure": "s",
+    "zenith_distance": "deg",
+    "extinction": "mag",
+    "sigma": "",
+    "false_alarms": "",
+    "max_stars": "",
+    "name_odds": "",
+    "time_limit": "s",
+}
+"""The units of numbers."""
+
+_VALUES: dict[str, Callable[[Any], Any]] = {
+    "pixel_scale": pixel_angle,
+    "near": direction,
+    "date": iso_date,
+    "utc_offset": utc_offset_text,
+    "site": site,
+    "air": air_at_site,
+    "velocity": velocity_km_s,
+    "refine_lens": bool,
+    "attitude_only": bool,
+    "sky": bool,
+    "trails": bool,
+}
+"""What makes plain values of others, and of astropy's."""
+
+
+def _text(name: str, value: Any) -> str:
+    """Return the value of an option as the command line takes it."""
+    value = number(value, _UNITS[name], name) if name in _UNITS else value
+    value = _VALUES[name](value) if name in _VALUES else value
+    if isinstance(value, bool):
+        return str(value).lower()
+    return ",".join(map(repr, value)) if isinstance(value, tuple) else str(value)
+
+
+def solve_options(header: Any = None, **options: Any) -> dict[str, str]:
     """Return what the compiled part takes; a header completes what is not known."""
-    if fov is not None and pixel_scale is not None:
-        raise ValueError("fov and pixel_scale say the same: give one")
+    for name in options.keys() - SolveOptions.__annotations__.keys():
+        raise TypeError(f"unexpected keyword argument {name!r}")
     header = {} if header is None else header
-    date = header_date(header) if date is None else date
-    exposure = header_exposure(header) if exposure is None else exposure
-    return {
-        "fov_deg": positive(fov, "deg", "fov", 360.0),
-        "pixel_scale_arcsec": pixel_angle(pixel_scale),
-        "scale_error_percent": positive(scale_error, "percent", "scale_error", 100.0),
-        "near_deg": direction(near),
-        "radius_deg": positive(radius, "deg", "radius", 180.000001),
-        "date": iso_date(date),
-        "utc_offset": utc_offset_text(utc_offset),
-        "site": geodetic(site),
-        "air": air_at_site(air, site),
-        "velocity_km_s": velocity_km_s(velocity),
-        "frame_of": str(frame_of),
-        "exposure_s": positive(exposure, "s", "exposure"),
-        "zenith_distance_deg": within(zenith_distance, "deg", "zenith_distance", 0.0, 89.999),
-        "extinction_mag_per_airmass": within(extinction, "mag", "extinction", 0.0, 10.0),
-        "sigma": positive(sigma, "", "sigma"),
-        "false_alarms_per_mpx": positive(false_alarms, "", "false_alarms"),
-        "max_stars": None if max_stars is None else whole_number(max_stars, "max_stars", 4),
-        "centroid": centroid,
-        "name_odds": within(name_odds, "", "name_odds", 1.0),
-        "effort": str(effort),
-        "refine_lens": bool(refine_lens),
-        "attitude_only": bool(attitude_only),
-        "sky": bool(sky),
-        "trails": bool(trails),
-        "time_limit_s": positive(time_limit, "s", "time_limit"),
-    }
+    known = {"date": header_date(header), "exposure": header_exposure(header)}
+    known |= {name: value for name, value in options.items() if value is not None}
+    if {"fov", "pixel_scale"} <= known.keys():
+        raise ValueError("fov and pixel_scale say the same: give one")
+    if "air" in known and "site" not in known:
+        raise ValueError("air is that of a site: give the site, too")
+    stated = {name: _text(name, value) for name, value in known.items() if value is not None}
+    _starpipe.check_options(stated)
+    return stated
 
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -193,7 +182,9 @@ def takes_options(function: _Function) -> _Function:
     """Give a function whose last parameter is ``**options`` the signature that it has with them."""
     signature = inspect.signature(function)
     own = list(signature.parameters.values())[:-1]
-    options = inspect.signature(solve_options).parameters.values()
-    stated = [option for option in options if option.kind is inspect.Parameter.KEYWORD_ONLY]
+    stated = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None)
+        for name in SolveOptions.__annotations__
+    ]
     function.__signature__ = signature.replace(parameters=own + stated)  # type: ignore[attr-defined]
     return function

@@ -22,6 +22,7 @@ __all__ = [
     "archive_nights",
     "archive_plan",
     "calibrate",
+    "check_options",
     "check_size",
     "defocus",
     "detect",
@@ -75,7 +76,7 @@ class Pipeline:
     @property
     def bias_adu(self) -> float: ...
     def solve(
-        self, frame: _Input, options: dict[str, Any], threads: int, as_drawn: bool
+        self, frame: _Input, options: dict[str, str], threads: int, as_drawn: bool
     ) -> Solved: ...
     def identify(
         self,
@@ -83,7 +84,7 @@ class Pipeline:
         shape: tuple[int, int] | None,
         brightness: str | None,
         has_errors: bool,
-        options: dict[str, Any],
+        options: dict[str, str],
     ) -> Solved: ...
 
 @final
@@ -183,13 +184,14 @@ class Flats:
 
 @final
 class Tracker:
-    def __new__(cls, pipeline: Pipeline, options: dict[str, Any], max_stars: int) -> Tracker: ...
+    def __new__(cls, pipeline: Pipeline, options: dict[str, str], max_stars: int) -> Tracker: ...
     def track(self, frame: _Input, time_s: float | None) -> str: ...
     def reset(self) -> None: ...
 
 def picture(frame: _Input) -> tuple[NDArray[np.uint8], tuple[int, int]]: ...
 def write_file(path: _Path, content: bytes) -> None: ...
 def star_columns() -> list[list[str]]: ...
+def check_options(options: dict[str, str]) -> None: ...
 def check_size(width: int, height: int) -> None: ...
 def detect(
     image: _Image,

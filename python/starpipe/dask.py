@@ -63,7 +63,7 @@ class _Job:
     options: dict[str, Any]
     catalog: str | None
     camera: bytes | None
-    stated: dict[str, Any]
+    stated: dict[str, str]
     read_ahead: int
     page: int | Literal["all"] | None
 

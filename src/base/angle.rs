@@ -78,6 +78,24 @@ impl Angle {
     }
 }
 
+/// A right ascension in degrees, written in degrees, or in hours, minutes and seconds; `None` where it is
+/// more than a turn, or none.
+pub fn right_ascension_deg(text: &str) -> Option<f64> {
+    const DEG_PER_HOUR: f64 = 15.0;
+    let deg = match Angle::parse(text)? {
+        Angle::Hours(hours) | Angle::Sexagesimal(hours) => hours * DEG_PER_HOUR,
+        Angle::Decimal(deg) | Angle::Degrees(deg) => deg,
+    };
+    (0.0..=360.0).contains(&deg).then_some(deg)
+}
+
+/// A declination in degrees, written in degrees, or in degrees, minutes and seconds; `None` where it is
+/// beyond a pole, or none.
+pub fn declination_deg(text: &str) -> Option<f64> {
+    let deg = Angle::parse(text)?.in_degrees()?;
+    (-90.0..=90.0).contains(&deg).then_some(deg)
+}
+
 /// Parses a finite decimal number; unlike `str::parse`, rejects words such as `inf`.
 pub fn decimal(text: &str) -> Option<f64> {
     let plain = text

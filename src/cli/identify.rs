@@ -45,12 +45,13 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<CommandOutput, Command
         solving,
     } = arguments;
     stdin::check_once(&lists)?;
+    let stated = solving.options()?;
     let camera = solving.hints.description()?;
     let mut options = CentroidListOptions::default();
     [options.width, options.height] = frame_size([width, height], camera.as_ref())?;
     options.frame = frame;
     let plan = SolvingPlan {
-        options: solving.options()?,
+        options: stated,
         camera,
         ..SolvingPlan::default()
     };

@@ -7,6 +7,7 @@ use super::options::calibration::CalibrationOptions;
 use super::options::catalog::CatalogOptions;
 use super::options::format::PageFormat;
 use super::options::hints::HintOptions;
+use super::options::stated::{ExposureOption, with_stated};
 use super::options::values;
 use super::output::messages::report_error;
 use super::output::stdout::print;
@@ -51,11 +52,8 @@ pub(crate) struct TrackArgs {
     format: PageFormat,
     #[command(flatten)]
     calibration: CalibrationOptions,
-    /// Exposure of the frames, in seconds: how far a turning camera smears its stars [default: the
-    /// exposure in the file's header]
-    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true,
-          help_heading = "What is known of the frames")]
-    exposure: Option<f64>,
+    #[command(flatten)]
+    exposure: ExposureOption,
     #[command(flatten)]
     hints: HintOptions,
     #[command(flatten)]
@@ -70,10 +68,9 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<CommandOutput, CommandError
             "- stands for the list on standard input, which can be read only once; it is given twice",
         ));
     }
+    let options = with_stated(arguments.hints.options()?, &arguments.exposure)?;
     let camera = arguments.hints.description()?;
     let calibration = arguments.calibration.read(camera.as_ref())?;
-    let mut options = arguments.hints.options()?;
-    options.exposure_s = arguments.exposure;
     arguments.catalog.with_index(|_, indexed| {
         let context = Context::new(indexed).with_options(&options, camera.clone());
         let mut run = TrackRun {

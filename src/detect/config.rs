@@ -1,17 +1,18 @@
 //! Options of detection.
 
 use crate::frame::{Frame, SaturationFinder};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How centroids are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum CentroidMethod {
-    /// Variance-weighted least-squares fit of a pixel-integrated Gaussian.
+    /// Variance-weighted fit of a pixel-integrated Gaussian: the most accurate.
     #[default]
     GaussianFit,
-    /// Mean of the pixels' positions, weighted by their grey level above a threshold.
+    /// Mean of the pixels' positions, weighted by their grey level above a threshold: the fastest.
     GreyWeighted,
 }
 

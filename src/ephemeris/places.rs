@@ -16,7 +16,7 @@ use crate::catalog::Star;
 use crate::ephemeris::observer::airmass::airmass_kasten_young;
 use crate::ephemeris::observer::{Air, Site, earth_velocity_c};
 use nalgebra::{Matrix3, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
 /// Speed of light in kilometres per second.
@@ -53,15 +53,16 @@ struct Refraction {
     north: UnitVector<Icrs>,
 }
 
-/// Which directions an attitude refers to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+/// Which directions an attitude refers to, in axes of ICRS.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum AttitudeFrame {
-    /// Those of the catalogue at the date: what is in the frame's centre has these coordinates.
+    /// Those of the catalogue at the date: coordinates of what is in the centre.
     #[default]
     Icrs,
-    /// Those from which light reaches the camera, in ICRS axes: how the camera itself is turned.
+    /// Those from which light reaches the camera: how the camera itself is turned.
     Apparent,
 }
 

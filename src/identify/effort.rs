@@ -1,10 +1,11 @@
 //! How much a search does.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How much is tried where the first triangles of bright stars do not identify a field. Frames that
 /// are identified at once take no longer with more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Effort {

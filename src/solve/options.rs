@@ -7,7 +7,7 @@ use crate::base::epoch::ObservationDate;
 use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use crate::camera::data_sheet::{CameraDescription, DataSheet};
 use crate::detect::{CentroidMethod, DetectConfig};
-use crate::ephemeris::observer::Site;
+use crate::ephemeris::observer::{Air, Site};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::{
     DateSource, Effort, FrameDate, NAME_ODDS, Priors, Scale, ScalePrior, SkyRegion,
@@ -19,8 +19,8 @@ use std::time::Duration;
 
 /// What is stated for all frames; `None` stands for what the frame itself or the default says.
 ///
-/// The options of `starpipe process` and of `Pipeline.solve` in Python have the names of these fields
-/// without their units.
+/// The command line, Python and the page set them by name, which is that of the field without its unit:
+/// [`with`](Self::with).
 ///
 /// # Example
 /// ```
@@ -54,6 +54,9 @@ pub struct SolveOptions {
     /// Where they were taken.
     #[serde(serialize_with = "geodetic")]
     pub site: Option<Site>,
+    /// The air there, where it is not that of [`site`](Self::site).
+    #[serde(skip)]
+    pub air: Option<Air>,
     /// Velocity of a spacecraft relative to the Earth's centre, along the axes of ICRS.
     pub velocity_km_s: Option<[f64; 3]>,
     /// Which directions attitudes refer to.
@@ -89,11 +92,6 @@ pub struct SolveOptions {
 }
 
 impl SolveOptions {
-    /// Default of [`scale_error_percent`](Self::scale_error_percent).
-    pub const DEFAULT_SCALE_ERROR_PERCENT: f64 = 10.0;
-    /// Default of [`radius_deg`](Self::radius_deg).
-    pub const DEFAULT_RADIUS_DEG: f64 = 10.0;
-
     /// What is known of every frame.
     pub fn priors(&self) -> Priors {
         let fov = self
@@ -114,11 +112,25 @@ impl SolveOptions {
             date: self
                 .date
                 .map(|date| FrameDate::stated(date, DateSource::User)),
-            site: self.site,
+            site: self.site_with_air(),
             velocity_km_s: self.velocity_km_s.map(Into::into),
             holds_lens: false,
             exposure_s: self.exposure_s,
         }
+    }
+
+    /// The defaults; but a frame may take as long as it needs.
+    pub fn unlimited() -> Self {
+        Self {
+            time_limit_s: None,
+            ..Self::default()
+        }
+    }
+
+    /// Where the frames were taken, with the air there.
+    pub fn site_with_air(&self) -> Option<Site> {
+        let with_air = |site: Site| self.air.map_or(site, |air| site.with_air(air));
+        self.site.map(with_air)
     }
 
     /// How to detect stars.
@@ -149,12 +161,13 @@ impl Default for SolveOptions {
         Self {
             fov_deg: None,
             pixel_scale_arcsec: None,
-            scale_error_percent: Self::DEFAULT_SCALE_ERROR_PERCENT,
+            scale_error_percent: 10.0,
             near_deg: None,
-            radius_deg: Self::DEFAULT_RADIUS_DEG,
+            radius_deg: 10.0,
             date: None,
             utc_offset: None,
             site: None,
+            air: None,
             velocity_km_s: None,
             attitude_frame: AttitudeFrame::default(),
             exposure_s: None,

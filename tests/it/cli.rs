@@ -99,9 +99,9 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
         ),
         (&["process", "--scale-error", "5", "a.png"], "--scale-error"),
         (&["process", "--fov", "NaN", "a.png"], "NaN"),
-        (&["process", "--fov", "-10", "a.png"], "field of view"),
-        (&["process", "--fov", "360", "a.png"], "field of view"),
-        (&["process", "--pixel-scale", "0", "a.png"], "pixel scale"),
+        (&["process", "--fov", "-10", "a.png"], "--fov"),
+        (&["process", "--fov", "360", "a.png"], "less than 360"),
+        (&["process", "--pixel-scale", "0", "a.png"], "pixel_scale"),
         (
             &["process", "--fov", "10", "--scale-error", "100", "a.png"],
             "--scale-error",
@@ -111,7 +111,7 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
             "--false-alarms",
         ),
         (&["process", "--sigma", "0", "a.png"], "--sigma"),
-        (&["process", "--sigma", "-3", "a.png"], "above 0"),
+        (&["process", "--sigma", "-3", "a.png"], "more than 0"),
         (
             &["process", "--out", "o", "a.tif", "b/a.tif"],
             "Usage: starpipe process [OPTIONS]",

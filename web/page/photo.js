@@ -51,15 +51,13 @@ const scout = new Engine(() => {});
 /** The options that the form states, as JSON: those of the chosen picture, or of a new one. */
 const stated = (isNew = false) => {
   const form = byId("hint-form");
-  const pair = (text) => text.split(/[,\s]+/).filter(Boolean).map((part) => Number(part.replace("−", "-")));
   const options = {};
   for (const [name, given] of new FormData(form)) {
-    const text = given instanceof File ? "" : given.trim();
+    const text = given instanceof File ? "" : given.trim().replaceAll("−", "-");
     if (!text || (isNew && name === "image")) continue;
-    if (name === "thorough") options.thorough = true;
-    else if (name === "date") options.date = text;
-    else if (name === "near_deg" || name === "site") options[name] = pair(text);
-    else options[name] = Number(text);
+    // The numbers of a pair may also stand side by side.
+    const isPair = (name === "near" || name === "site") && !text.includes(",");
+    options[name] = name === "image" ? Number(text) : isPair ? text.replace(/\s+/, ",") : text;
   }
   return JSON.stringify(options);
 };

@@ -125,8 +125,8 @@ impl CalibrateArgs {
     }
 
     fn plan(&self) -> Result<SolvingPlan, CommandError> {
-        let camera = self.hints.description()?;
         let mut options = self.hints.options()?;
+        let camera = self.hints.description()?;
         // The lens is what is to be measured.
         options.refine_lens = true;
         Ok(SolvingPlan {

@@ -7,11 +7,10 @@ use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::format::PageFormat;
 use crate::cli::options::frames::MemoryOption;
 use crate::cli::options::hints::HintOptions;
-use crate::cli::options::values;
+use crate::cli::options::stated::{ExposureOption, TimeLimitOption, with_stated};
 use crate::cli::solving::SolvingPlan;
 use clap::Args;
 use starpipe::calibration::Calibration;
-use starpipe::solve::{DEFAULT_TIME_LIMIT_S, SolveOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -46,18 +45,14 @@ pub(crate) struct NightArgs {
     pub(super) mask_hot_pixels: bool,
     #[command(flatten)]
     pub(super) calibration: CalibrationOptions,
-    /// Exposure of the frames, in seconds [default: the exposure in the file's header]
-    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true,
-          help_heading = "What is known of the frames")]
-    exposure: Option<f64>,
+    #[command(flatten)]
+    exposure: ExposureOption,
     #[command(flatten)]
     pub(super) hints: HintOptions,
     #[command(flatten)]
     pub(super) station: StationOptions,
-    /// Time limit for a frame, in seconds; a frame that exceeds it counts as not identified
-    #[arg(long = "time-limit", value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true,
-          default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
-    time_limit_s: f64,
+    #[command(flatten)]
+    limit: TimeLimitOption,
     #[command(flatten)]
     memory: MemoryOption,
     #[command(flatten)]
@@ -91,18 +86,17 @@ impl NightArgs {
 
     /// What the frames are solved with.
     pub(super) fn plan(&self) -> Result<SolvingPlan, CommandError> {
-        if self.hints.date.is_some() {
+        let options = with_stated(self.hints.options()?, &self.exposure)?;
+        let mut options = with_stated(options, &self.limit)?;
+        if options.date.is_some() {
             return Err(CommandError::usage(
                 "--date is one date for all frames; those of a night have their own, in their headers or in \
                  their names with --utc-offset",
             ));
         }
         let camera = self.hints.description()?;
-        let mut options: SolveOptions = self.hints.options()?;
         options.sky = true;
         options.trails = true;
-        options.exposure_s = self.exposure;
-        options.time_limit_s = Some(self.time_limit_s);
         Ok(SolvingPlan {
             options,
             calibration: self.calibration.read(camera.as_ref())?,

@@ -9,6 +9,7 @@ pub(crate) mod observer;
 pub(crate) mod parameters;
 pub(crate) mod scenario;
 pub(crate) mod setup;
+pub(crate) mod stated;
 pub(crate) mod steps;
 pub(crate) mod threads;
 pub(crate) mod values;

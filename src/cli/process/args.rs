@@ -3,11 +3,11 @@
 use crate::cli::exit::CommandError;
 use crate::cli::options::calibration::CalibrationOptions;
 use crate::cli::options::frames::{FrameOptions, MemoryOption};
-use crate::cli::options::hints::set;
-use crate::cli::options::values;
+use crate::cli::options::stated::{ExposureOption, with_stated};
 use crate::cli::solving::SolvingPlan;
 use crate::cli::solving::options::SolvingOptions;
-use clap::{Args, ValueEnum, value_parser};
+use clap::Args;
+use serde::Serialize;
 use starpipe::detect::CentroidMethod;
 use starpipe::frame::PageChoice;
 use starpipe::solve::SolveOptions;
@@ -42,9 +42,9 @@ pub(crate) struct ProcessArgs {
     #[command(flatten)]
     pub(super) calibration: CalibrationOptions,
     #[command(flatten)]
-    pub(super) detection: DetectionOptions,
+    detection: DetectionOptions,
     #[command(flatten)]
-    pub(super) exposure: ExposureOptions,
+    conditions: ConditionOptions,
     #[command(flatten)]
     pub(super) memory: MemoryOption,
     #[command(flatten)]
@@ -53,54 +53,57 @@ pub(crate) struct ProcessArgs {
     pub(super) parts: PartOptions,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize)]
 #[command(next_help_heading = "Detection")]
-pub(super) struct DetectionOptions {
+struct DetectionOptions {
     /// Detection threshold in standard deviations of the background, in place of --false-alarms
-    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true,
-          conflicts_with = "false_alarms")]
-    pub(super) sigma: Option<f64>,
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        allow_hyphen_values = true,
+        conflicts_with = "false_alarms"
+    )]
+    sigma: Option<String>,
     /// Accepted false detections in a million pixels of noise [default: 0.1]
-    #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true)]
-    pub(super) false_alarms: Option<f64>,
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    false_alarms: Option<String>,
     /// Maximum number of stars to measure, the brightest; a star tracker needs about 20. The
     /// limiting magnitude is then not measured
-    #[arg(long, value_name = "NUMBER", value_parser = value_parser!(u64).range(4..),
-          allow_hyphen_values = true)]
-    pub(super) max_stars: Option<u64>,
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    max_stars: Option<String>,
     /// Search satellites, aeroplanes and meteors, too: straight lines of light
     #[arg(long)]
-    pub(super) trails: bool,
+    trails: bool,
     /// How to measure the position of a star
     #[arg(long, value_name = "METHOD", value_enum)]
-    pub(super) centroid: Option<CentroidMethodOption>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum CentroidMethodOption {
-    /// Fit of a Gaussian spot: the most accurate
-    GaussianFit,
-    /// Centre of the light above a threshold: the fastest
-    GreyWeighted,
+    centroid: Option<CentroidMethod>,
 }
 
 /// Hints that apply to frames, but not to lists of centroids.
-#[derive(Debug, Args)]
+#[derive(Debug, Args, Serialize)]
 #[command(next_help_heading = "What is known of the frames")]
-pub(super) struct ExposureOptions {
-    /// Exposure of the frames, in seconds [default: the exposure in the file's header]
-    #[arg(long, value_name = "SECONDS", value_parser = values::exposure, allow_hyphen_values = true)]
-    pub(super) exposure: Option<f64>,
+struct ConditionOptions {
+    #[command(flatten)]
+    #[serde(flatten)]
+    exposure: ExposureOption,
     /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and
     /// the date, else from the header, else 0]
-    #[arg(long, value_name = "DEG", value_parser = values::zenith_distance, allow_hyphen_values = true,
-          requires = "camera")]
-    pub(super) zenith_distance: Option<f64>,
+    #[arg(
+        long,
+        value_name = "DEG",
+        allow_hyphen_values = true,
+        requires = "camera"
+    )]
+    zenith_distance: Option<String>,
     /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity
     /// paper, 0.35 in V]
-    #[arg(long, value_name = "MAG", value_parser = values::extinction, allow_hyphen_values = true,
-          requires = "camera")]
-    pub(super) extinction: Option<f64>,
+    #[arg(
+        long,
+        value_name = "MAG",
+        allow_hyphen_values = true,
+        requires = "camera"
+    )]
+    extinction: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -123,42 +126,21 @@ pub(super) struct PartOptions {
 impl ProcessArgs {
     /// All that is stated for the frames.
     fn options(&self) -> Result<SolveOptions, CommandError> {
-        let mut options = self.solving.options()?;
+        let options = with_stated(self.solving.options()?, &self.detection)?;
+        let mut options = with_stated(options, &self.conditions)?;
         options.sky = self.sky;
-        options.trails = self.detection.trails || self.sky;
-        options.exposure_s = self.exposure.exposure;
-        options.zenith_distance_deg = self.exposure.zenith_distance;
-        options.extinction_mag_per_airmass = self.exposure.extinction;
-        let detection = &self.detection;
-        options.sigma = detection.sigma;
-        set(&mut options.false_alarms_per_mpx, detection.false_alarms);
-        set(
-            &mut options.max_stars,
-            detection.max_stars.map(|stars| stars as usize),
-        );
-        set(
-            &mut options.centroid,
-            detection.centroid.map(CentroidMethod::from),
-        );
+        options.trails |= self.sky;
         Ok(options)
     }
 
     pub(super) fn plan(&self) -> Result<SolvingPlan, CommandError> {
+        let options = self.options()?;
         let camera = self.solving.hints.description()?;
         Ok(SolvingPlan {
-            options: self.options()?,
+            options,
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
         })
-    }
-}
-
-impl From<CentroidMethodOption> for CentroidMethod {
-    fn from(centroid: CentroidMethodOption) -> Self {
-        match centroid {
-            CentroidMethodOption::GaussianFit => Self::GaussianFit,
-            CentroidMethodOption::GreyWeighted => Self::GreyWeighted,
-        }
     }
 }

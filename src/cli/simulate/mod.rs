@@ -12,6 +12,7 @@ pub(crate) use args::SimulateArgs;
 use super::batch::for_each_ordered;
 use super::exit::{CommandError, CommandOutput};
 use super::options::format::PageFormat;
+use super::options::stated::with_stated;
 use super::output::files::{failures, write_whole};
 use super::output::messages::report_error;
 use super::output::rows::{csv_table, json_lines};
@@ -24,11 +25,13 @@ use record::SimulationRecord;
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::lab::simulate::{Simulator, truth_table};
 use starpipe::predict::{Budget, Detector, Rule};
+use starpipe::solve::SolveOptions;
 use std::ops::ControlFlow;
 use subject::FrameSubject;
 
 /// `starpipe simulate`
 pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<CommandOutput, CommandError> {
+    let observer = with_stated(SolveOptions::default(), &arguments.observer)?;
     let setup = arguments.setup.setup()?;
     let subject = FrameSubject::of(arguments, &setup)?;
     let files = FrameFiles::from_arguments(arguments, &subject, &setup.scenario.camera)?;
@@ -38,8 +41,8 @@ pub(crate) fn simulate(arguments: &SimulateArgs) -> Result<CommandOutput, Comman
         .context("simulating a frame")?;
     let uniform = simulator.uniform_scenario();
     let detector = Detector::new(Rule::MatchedFilter, &uniform, &Budget::new(&uniform));
-    let site = arguments.observer.site();
-    let velocity_km_s = arguments.observer.velocity_km_s();
+    let site = observer.site_with_air();
+    let velocity_km_s = observer.velocity_km_s;
     let generator = Generator {
         setup: &setup,
         simulator: &simulator,

@@ -4,56 +4,42 @@ use super::overlay_args::OverlayArgs;
 use crate::cli::exit::CommandError;
 use crate::cli::options::catalog::CatalogOptions;
 use crate::cli::options::hints::HintOptions;
-use crate::cli::options::values;
+use crate::cli::options::stated::{TimeLimitOption, with_stated};
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use starpipe::identify::{Effort, NAME_ODDS};
 use starpipe::report::tables::TableFormat;
-use starpipe::solve::{DEFAULT_TIME_LIMIT_S, SolveOptions};
+use starpipe::solve::SolveOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct SolvingOptions {
     #[command(flatten)]
     pub(crate) hints: HintOptions,
-    /// Give a star a name only where the odds are at least this many to 1 that it is right
-    #[arg(long, value_name = "NUMBER", value_parser = values::odds, allow_hyphen_values = true,
-          default_value_t = NAME_ODDS, help_heading = "Identification")]
-    pub(crate) name_odds: f64,
-    /// How much is tried where the brightest stars do not identify a frame at once
-    #[arg(long, value_enum, default_value_t = EffortOption::Normal, help_heading = "Identification")]
-    pub(crate) effort: EffortOption,
-    /// Determine attitude and optics only, from the brightest stars: no further names, no zero point
-    /// and no limiting magnitude
-    #[arg(long, help_heading = "Identification")]
-    pub(crate) attitude_only: bool,
-    /// Time limit for a frame, in seconds; a frame that exceeds it is reported as not identified
-    #[arg(long = "time-limit", value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true,
-          default_value_t = DEFAULT_TIME_LIMIT_S, help_heading = "Limits")]
-    pub(crate) time_limit_s: f64,
+    #[command(flatten)]
+    identification: IdentificationOptions,
+    #[command(flatten)]
+    limit: TimeLimitOption,
     #[command(flatten)]
     pub(crate) output: OutputOptions,
     #[command(flatten)]
     pub(crate) catalog: CatalogOptions,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum EffortOption {
-    /// A quarter of the usual work
-    Fast,
-    /// The usual work
-    Normal,
-    /// Eight times the usual work, and more choices of stars
-    Thorough,
-}
-
-impl From<EffortOption> for Effort {
-    fn from(effort: EffortOption) -> Self {
-        match effort {
-            EffortOption::Fast => Self::Fast,
-            EffortOption::Normal => Self::Normal,
-            EffortOption::Thorough => Self::Thorough,
-        }
-    }
+#[derive(Debug, Args, Serialize)]
+#[command(next_help_heading = "Identification")]
+struct IdentificationOptions {
+    /// Give a star a name only where the odds are at least this many to 1 that it is right
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true,
+          default_value_t = NAME_ODDS.to_string())]
+    name_odds: String,
+    /// How much is tried where the brightest stars do not identify a frame at once
+    #[arg(long, value_enum, default_value_t)]
+    effort: Effort,
+    /// Determine attitude and optics only, from the brightest stars: no further names, no zero point
+    /// and no limiting magnitude
+    #[arg(long)]
+    attitude_only: bool,
 }
 
 /// The forms of reports.
@@ -163,11 +149,7 @@ impl OutputOptions {
 impl SolvingOptions {
     /// The defaults with what is given.
     pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
-        let mut options = self.hints.options()?;
-        options.name_odds = self.name_odds;
-        options.effort = self.effort.into();
-        options.attitude_only = self.attitude_only;
-        options.time_limit_s = Some(self.time_limit_s);
-        Ok(options)
+        let options = with_stated(self.hints.options()?, &self.identification)?;
+        with_stated(options, &self.limit)
     }
 }
