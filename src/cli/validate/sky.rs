@@ -5,11 +5,11 @@ use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::output::journal::{Journal, JournalRow};
 use crate::cli::output::rows::{csv_table, json_indented};
-use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use starpipe::ephemeris::observer::Site;
 use starpipe::lab::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
 use starpipe::lab::validation::ValidationProtocol;
 use starpipe::lab::validation::store::claim_directory;
+use starpipe::report::figure::{Axis, Dot, Marks, Panel, PlotLayer, Rgb, Sheet};
 use starpipe::solve::Workspace;
 use std::path::Path;
 
@@ -98,7 +98,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
     let dots = |value: fn(&TrialFrameRow) -> Option<(f64, f64, f64)>| {
         let dots = trials.iter().filter_map(|trial| value(&trial.frame));
         Marks::Dots(
-            dots.map(|(x, y, sigma)| (x, y, [y - sigma, y + sigma]))
+            dots.map(|(x, y, sigma)| Dot::from((x, y, [y - sigma, y + sigma])))
                 .collect(),
         )
     };
@@ -108,8 +108,9 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         y: Axis::new(y),
         layers: vec![
             PlotLayer::guide(Marks::Levels(vec![0.0])),
-            PlotLayer::new("frames", BLUE, marks),
+            PlotLayer::new("frames", Rgb::BLUE, marks),
         ],
+        ..Panel::default()
     };
     let zenith = dots(|row| {
         let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
@@ -149,9 +150,14 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
                 x: Axis::new("stated").within(0.0, 1.0),
                 y: Axis::new("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
-                    PlotLayer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
-                    PlotLayer::new("found", BLUE, Marks::Line(told.collect())),
+                    PlotLayer::new(
+                        "if true",
+                        Rgb::ORANGE,
+                        Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)]),
+                    ),
+                    PlotLayer::new("found", Rgb::BLUE, Marks::Line(told.collect())),
                 ],
+                ..Panel::default()
             },
         ],
         2,
