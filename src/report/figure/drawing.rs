@@ -90,7 +90,7 @@ impl Letters {
     }
 }
 
-/// About how wide `text` is: fonts of other machines are hardly wider than that of ours.
+/// About how wide `text` is when it is drawn: fonts of other machines are hardly wider than that of ours.
 pub(super) fn width_px(text: &str, size: f32) -> f32 {
     let em = |character: char| match character {
         'i' | 'j' | 'l' | 'I' | 'J' | '\'' => 0.29,
@@ -103,7 +103,7 @@ pub(super) fn width_px(text: &str, size: f32) -> f32 {
         'A'..='Z' => 0.71,
         _ => 0.62,
     };
-    size * text.chars().map(em).sum::<f32>()
+    size * typeset(text).chars().map(em).sum::<f32>()
 }
 
 /// The words of `text` in lines of at most this width.
