@@ -5,11 +5,11 @@
 use super::exit::CommandError;
 use super::output::files::NewFile;
 use super::output::overwrite;
-use super::plot::{Figure as _, Form, Sheet};
 use anyhow::Context;
 use clap::Args;
 use starpipe::catalog::Catalog;
 use starpipe::frame::{self, Buffers};
+use starpipe::report::figure::Sheet;
 use starpipe::report::page::{Fact, PageContent, PageFigure, PageTable, Thumbnail};
 use std::ffi::OsStr;
 use std::num::NonZeroUsize;
@@ -61,14 +61,13 @@ pub(crate) fn file(path: &Path, page: &PageContent) -> anyhow::Result<NewFile> {
 }
 
 /// A figure of a page.
-pub(crate) fn figure(sheet: &Sheet, caption: &str) -> anyhow::Result<PageFigure> {
-    let drawing = sheet.render(Form::Svg).context("drawing the figure")?;
-    Ok(PageFigure {
+pub(crate) fn figure(sheet: &Sheet, caption: &str) -> PageFigure {
+    PageFigure {
         caption: caption.to_owned(),
-        svg: String::from_utf8(drawing)?,
+        svg: sheet.svg(),
         is_wide: sheet.is_wide(),
         is_colored: sheet.is_colored(),
-    })
+    }
 }
 
 /// A table of a page, from a command's CSV.

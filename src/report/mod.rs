@@ -4,8 +4,8 @@
 //!
 //! [`Track`](crate::track::Track) → [`TrackReport`] → JSON line or text
 //!
-//! [`overlay`] draws the frame with its stars, [`page`] shows it in a browser; [`wcs`] writes its coordinates as
-//! a FITS header.
+//! [`overlay`] draws the frame with its stars, [`figure`] draws charts and maps, [`page`] shows the frame in a
+//! browser; [`wcs`] writes its coordinates as a FITS header.
 //!
 //! Conventions: [`crate::conventions`]. Numbers are rounded to their significant digits. A number
 //! that is not finite is `null` in JSON and an empty field in CSV. Fields may be added to the JSON;
@@ -14,6 +14,7 @@
 mod bodies;
 mod build;
 mod digits;
+pub mod figure;
 mod frame_report;
 mod lens;
 #[cfg(feature = "overlay")]

@@ -1,34 +1,20 @@
 //! A picture of the sky at each place of a frame: brightness, extinction and limits, as SVG.
 
+use super::figure::{
+    Area, Axis, ColorScale, Marks, Panel, PanelKind, PlotLayer, Rgb, Sheet, diverging, sequential,
+};
 use super::frame_report::FrameReport;
 use super::sky::{SkyCellReport, SkyReport};
-use crate::base::format::xml_escaped;
 use crate::base::units::RAD_PER_DEG;
-use memchr::memmem;
 use std::ffi::OsStr;
-use std::fmt::Write as _;
 use std::path::Path;
 
-/// Radius of a sky, in units of the figure.
-const RADIUS: f64 = 150.0;
-/// Width of a panel.
-const PANEL: f64 = 380.0;
-/// Height of the figure.
-const HEIGHT: f64 = 490.0;
-/// Height of the centre of a sky.
-const MIDDLE: f64 = 238.0;
-/// Steps of the color bar.
-const BAR_STEPS: usize = 40;
+/// Most width and height of a sky.
+const SKY_PX: f32 = 300.0;
+/// Half of the width of a sky in degrees from the zenith, with room for the cardinal points.
+const REACH_DEG: f64 = 100.0;
 /// Points along the side of a cell at most 5° long.
 const SIDE_POINTS: usize = 4;
-
-/// Says what the figure is.
-const COMMENT: &str = "<!-- starpipe sky -->";
-
-/// Whether a file that begins like this is such a figure.
-pub fn is_figure(head: &[u8]) -> bool {
-    memmem::find(head, COMMENT.as_bytes()).is_some()
-}
 
 /// One picture of the sky.
 struct SkyPanel {
@@ -37,9 +23,9 @@ struct SkyPanel {
     value: fn(&SkyCellReport) -> Option<f64>,
     /// Whether low values are light: bright skies have low magnitudes.
     is_low_light: bool,
-    /// Bounds of the colors; `None` for those of the values.
-    bounds: Option<[f64; 2]>,
-    decimals: usize,
+    /// Values of the first and the last color; `None` for those that there are.
+    ends: Option<[f64; 2]>,
+    palette: fn(f64) -> Rgb,
 }
 
 const PANELS: [SkyPanel; 3] = [
@@ -48,54 +34,39 @@ const PANELS: [SkyPanel; 3] = [
         unit: "V magnitude of a square arcsecond",
         value: |cell| cell.mag_arcsec2,
         is_low_light: true,
-        bounds: None,
-        decimals: 1,
+        ends: None,
+        palette: sequential,
     },
     SkyPanel {
         title: "Extinction by clouds",
         unit: "magnitudes beyond clear air",
         value: |cell| cell.extinction_mag,
         is_low_light: false,
-        bounds: Some([0.0, 2.0]),
-        decimals: 1,
+        ends: Some([0.0, 2.0]),
+        palette: sequential,
     },
     SkyPanel {
         title: "Limit, measured − expected",
-        unit: "magnitudes",
+        unit: "magnitudes; white: as expected",
         value: |cell| Some(cell.limit_vmag? - cell.expected_limit_vmag?),
         is_low_light: false,
-        bounds: Some([-1.0, 1.0]),
-        decimals: 1,
+        ends: Some([-1.0, 1.0]),
+        palette: diverging,
     },
 ];
 
 /// The figure of `report`; `None` if its sky was not measured.
 pub fn svg(report: &FrameReport) -> Option<String> {
     let sky = report.sky.as_ref()?;
-    let shown = PANELS.iter().filter(|panel| {
-        let mut cells = sky.cells.iter();
-        cells.any(|cell| (panel.value)(cell).is_some())
-    });
-    let shown: Vec<&SkyPanel> = shown.collect();
-    let width = PANEL * shown.len().max(1) as f64;
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {HEIGHT}\" width=\"{width}\" \
-         height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"13\">\n{COMMENT}\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"16\" y=\"26\" font-size=\"16\">{}</text>\n",
-        xml_escaped(&title(report, sky))
-    );
-    for (number, panel) in shown.into_iter().enumerate() {
-        let _ = writeln!(
-            out,
-            "<g transform=\"translate({} 0)\">",
-            PANEL * number as f64
-        );
-        panel.draw(&mut out, report, sky);
-        out.push_str("</g>\n");
-    }
-    out.push_str("</svg>\n");
-    Some(out)
+    let panels = PANELS.iter().filter_map(|panel| panel.draw(report, sky));
+    let panels: Vec<Panel> = panels.collect();
+    let abreast = panels.len();
+    let sheet = Sheet {
+        title: title(report, sky),
+        frame_px: [SKY_PX; 2],
+        ..Sheet::new(panels, abreast)
+    };
+    Some(sheet.svg())
 }
 
 /// The result in words.
@@ -119,143 +90,107 @@ fn title(report: &FrameReport, sky: &SkyReport) -> String {
 }
 
 impl SkyPanel {
-    /// The color of a value from 0 to 1 between the bounds.
-    fn color(&self, value: f64) -> String {
-        color(if self.is_low_light {
-            1.0 - value
+    /// The picture; `None` where no value is known.
+    fn draw(&self, report: &FrameReport, sky: &SkyReport) -> Option<Panel> {
+        let known = |cell: &'_ SkyCellReport| (self.value)(cell);
+        let [low, high] = sky
+            .cells
+            .iter()
+            .filter_map(known)
+            .fold(None, |range, value| {
+                let [low, high] = range.unwrap_or([value; 2]);
+                Some([f64::min(low, value), f64::max(high, value)])
+            })?;
+        let scale = ColorScale {
+            title: self.unit.to_owned(),
+            ends: match self.ends {
+                Some(ends) => ends,
+                None if self.is_low_light => [high.max(low + 0.1), low],
+                None => [low, high.max(low + 0.1)],
+            },
+            is_log: false,
+            palette: self.palette,
+        };
+        let area = |cell: &SkyCellReport| {
+            let value = known(cell)?;
+            Some(Area {
+                points: outline(cell),
+                color: scale.color(value),
+                note: format!("{} {value:.2}", place(cell)),
+            })
+        };
+        let areas = sky.cells.iter().filter_map(area).collect();
+        let mut layers = vec![PlotLayer::colored(areas, scale.clone())];
+        let (kind, [x, y]) = if sky.cells.iter().any(|cell| cell.altitude_deg.is_some()) {
+            layers.extend(horizon());
+            (
+                PanelKind::Bare,
+                ["", ""].map(|name| Axis::new(name).within(-REACH_DEG, REACH_DEG)),
+            )
         } else {
-            value
+            let [width, height] = [report.width, report.height].map(|side| side as f64 - 0.5);
+            let axes = [
+                Axis::new("x (px)").within(-0.5, width),
+                Axis::new("y (px)").within(height, -0.5),
+            ];
+            (PanelKind::Map, axes)
+        };
+        Some(Panel {
+            title: self.title.to_owned(),
+            x,
+            y,
+            layers,
+            kind,
         })
-    }
-
-    fn draw(&self, out: &mut String, report: &FrameReport, sky: &SkyReport) {
-        let values = sky.cells.iter().filter_map(self.value);
-        let range = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        });
-        let bounds = self.bounds.unwrap_or(range);
-        let _ = writeln!(
-            out,
-            "<text x=\"{}\" y=\"52\" text-anchor=\"middle\">{}</text>",
-            PANEL / 2.0,
-            self.title
-        );
-        for cell in &sky.cells {
-            let Some(value) = (self.value)(cell) else {
-                continue;
-            };
-            let span = (bounds[1] - bounds[0]).max(1e-9);
-            let color = self.color((value - bounds[0]) / span);
-            let outline = outline(cell, report);
-            let _ = writeln!(
-                out,
-                "<path d=\"{outline}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.5\">\
-                 <title>{} {value:.2}</title></path>",
-                place(cell),
-            );
-        }
-        if sky.cells.iter().any(|cell| cell.altitude_deg.is_some()) {
-            draw_horizon(out);
-        }
-        self.draw_bar(out, bounds);
-    }
-
-    fn draw_bar(&self, out: &mut String, bounds: [f64; 2]) {
-        let (left, top, length) = (PANEL / 2.0 - RADIUS, MIDDLE + RADIUS + 40.0, 2.0 * RADIUS);
-        let step = length / BAR_STEPS as f64;
-        for i in 0..BAR_STEPS {
-            let _ = writeln!(
-                out,
-                "<rect x=\"{:.1}\" y=\"{top}\" width=\"{:.1}\" height=\"12\" fill=\"{}\"/>",
-                left + i as f64 * step,
-                step + 0.5,
-                self.color((i as f64 + 0.5) / BAR_STEPS as f64),
-            );
-        }
-        let decimals = self.decimals;
-        let middle = 0.5 * (bounds[0] + bounds[1]);
-        for (at, value) in [(0.0, bounds[0]), (0.5, middle), (1.0, bounds[1])] {
-            let _ = writeln!(
-                out,
-                "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\" font-size=\"11\">{value:.decimals$}</text>",
-                left + at * length,
-                top + 26.0,
-            );
-        }
-        let _ = writeln!(
-            out,
-            "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\" font-size=\"11\">{}</text>",
-            PANEL / 2.0,
-            top + 42.0,
-            self.unit
-        );
     }
 }
 
 /// Circles of altitude and the cardinal points: as one looks up, with east on the left.
-fn draw_horizon(out: &mut String) {
-    for altitude_deg in [0.0, 30.0, 60.0] {
-        let radius = RADIUS * (90.0 - altitude_deg) / 90.0;
-        let _ = writeln!(
-            out,
-            "<circle cx=\"{}\" cy=\"{MIDDLE}\" r=\"{radius:.1}\" fill=\"none\" stroke=\"black\" \
-             stroke-opacity=\"0.4\" stroke-width=\"0.7\"/>",
-            PANEL / 2.0,
-        );
-        if altitude_deg > 0.0 {
-            let _ = writeln!(
-                out,
-                "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"9\" fill-opacity=\"0.7\">{altitude_deg:.0}°</text>",
-                PANEL / 2.0 + 2.0,
-                MIDDLE - radius - 2.0,
-            );
-        }
-    }
-    for (name, azimuth_deg) in [("N", 0.0), ("E", 90.0), ("S", 180.0), ("W", 270.0)] {
-        let [x, y] = on_sky(-8.0, azimuth_deg);
-        let _ = writeln!(
-            out,
-            "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{name}</text>",
-            y + 4.5
-        );
-    }
+fn horizon() -> [PlotLayer; 2] {
+    let circle = |altitude_deg: f64| {
+        let azimuths = (0..=72).map(|step| 5.0 * f64::from(step));
+        azimuths
+            .map(|azimuth_deg| on_sky(altitude_deg, azimuth_deg))
+            .collect()
+    };
+    let named = |name: &str, altitude_deg: f64, azimuth_deg: f64| {
+        let (x, y) = on_sky(altitude_deg, azimuth_deg);
+        (x, y, name.to_owned())
+    };
+    let names = [
+        named("N", -6.0, 0.0),
+        named("E", -6.0, 90.0),
+        named("S", -6.0, 180.0),
+        named("W", -6.0, 270.0),
+        named("30°", 30.0, 0.0),
+        named("60°", 60.0, 0.0),
+    ];
+    let circles = [0.0, 30.0, 60.0].map(circle).into();
+    [
+        PlotLayer::guide(Marks::Lines(circles)),
+        PlotLayer::unnamed(Rgb::BLACK, Marks::Texts(names.into())),
+    ]
 }
 
 /// Where a direction is: the zenith in the middle, north above, east on the left.
-fn on_sky(altitude_deg: f64, azimuth_deg: f64) -> [f64; 2] {
-    let radius = RADIUS * (90.0 - altitude_deg) / 90.0;
+fn on_sky(altitude_deg: f64, azimuth_deg: f64) -> (f64, f64) {
+    let from_zenith_deg = 90.0 - altitude_deg;
     let (sin, cos) = libm::sincos(azimuth_deg * RAD_PER_DEG);
-    [PANEL / 2.0 - radius * sin, MIDDLE - radius * cos]
+    (-from_zenith_deg * sin, from_zenith_deg * cos)
 }
 
 /// The outline of a cell.
-fn outline(cell: &SkyCellReport, report: &FrameReport) -> String {
-    let mut points = Vec::new();
-    if let (Some([low, high]), Some([from, to])) = (cell.altitude_deg, cell.azimuth_deg) {
-        let azimuth = |i: usize| from + (to - from) * i as f64 / SIDE_POINTS as f64;
-        points.extend((0..=SIDE_POINTS).map(|i| on_sky(low, azimuth(i))));
-        points.extend((0..=SIDE_POINTS).rev().map(|i| on_sky(high, azimuth(i))));
-    } else if let (Some(x), Some(y)) = (cell.x, cell.y) {
-        let (width, height) = (report.width as f64, report.height as f64);
-        let scale = 2.0 * RADIUS / width.max(height);
-        let at = |x: f64, y: f64| {
-            [
-                PANEL / 2.0 + (x + 0.5 - width / 2.0) * scale,
-                MIDDLE + (y + 0.5 - height / 2.0) * scale,
-            ]
-        };
-        points.extend([
-            at(x[0], y[0]),
-            at(x[1], y[0]),
-            at(x[1], y[1]),
-            at(x[0], y[1]),
-        ]);
+fn outline(cell: &SkyCellReport) -> Vec<(f64, f64)> {
+    match (cell.altitude_deg, cell.azimuth_deg, cell.x, cell.y) {
+        (Some([low, high]), Some([from, to]), _, _) => {
+            let azimuth = |i: usize| from + (to - from) * i as f64 / SIDE_POINTS as f64;
+            let below = (0..=SIDE_POINTS).map(|i| on_sky(low, azimuth(i)));
+            let above = (0..=SIDE_POINTS).rev().map(|i| on_sky(high, azimuth(i)));
+            below.chain(above).collect()
+        }
+        (_, _, Some(x), Some(y)) => Area::rectangle(x, y, Rgb::PAPER).points,
+        _ => Vec::new(),
     }
-    let mut path = String::new();
-    for (number, [x, y]) in points.into_iter().enumerate() {
-        let _ = write!(path, "{}{x:.1} {y:.1}", if number == 0 { "M" } else { "L" });
-    }
-    path + "Z"
 }
 
 /// Where a cell is, in words.
@@ -270,44 +205,14 @@ fn place(cell: &SkyCellReport) -> String {
     }
 }
 
-/// The color of a value from 0 to 1, whose lightness grows evenly: cividis, which deuteranopes see alike.
-///
-/// # Reference
-/// Nuñez, Anderton & Renslow 2018, PLoS ONE 13, e0199239.
-pub(crate) fn color(value: f64) -> String {
-    const STOPS: [[f64; 3]; 6] = [
-        [0.0, 34.0, 78.0],
-        [53.0, 69.0, 108.0],
-        [102.0, 105.0, 112.0],
-        [148.0, 142.0, 119.0],
-        [200.0, 184.0, 102.0],
-        [254.0, 232.0, 56.0],
-    ];
-    let at = value.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
-    let stop = (at as usize).min(STOPS.len() - 2);
-    let part = at - stop as f64;
-    let [red, green, blue] = [0, 1, 2].map(|channel| {
-        let [from, to] = [STOPS[stop][channel], STOPS[stop + 1][channel]];
-        (from + part * (to - from)).round() as u8
-    });
-    format!("#{red:02x}{green:02x}{blue:02x}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_zenith_is_in_the_middle_and_east_on_the_left() {
-        assert_eq!(on_sky(90.0, 123.0), [PANEL / 2.0, MIDDLE]);
-        let [x, y] = on_sky(0.0, 90.0);
-        assert!((x - (PANEL / 2.0 - RADIUS)).abs() < 1e-9 && (y - MIDDLE).abs() < 1e-9);
-    }
-
-    #[test]
-    fn colors_grow_lighter() {
-        assert_eq!(color(-1.0), "#00224e");
-        assert_eq!(color(2.0), "#fee838");
-        assert_eq!(color(0.4), "#666970");
+        assert_eq!(on_sky(90.0, 123.0), (0.0, 0.0));
+        let (x, y) = on_sky(0.0, 90.0);
+        assert!((x + 90.0).abs() < 1e-9 && y.abs() < 1e-9);
     }
 }

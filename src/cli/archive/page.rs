@@ -3,19 +3,17 @@
 use super::nights::{NightLine, nights_text};
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{codes_note, figure, options, table, thumbnails};
-use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use serde::Serialize;
 use serde_json::Value;
 use starpipe::base::format::counted;
 use starpipe::base::statistics::{median, quantile};
+use starpipe::report::figure::{Axis, Dot, Marks, Panel, PlotLayer, Rgb, Sheet, Spacing};
 use starpipe::report::page::{Fact, PageContent, PageFigure};
 use starpipe::store::{Archive, CameraNight, FrameSummary, frames, status};
 use std::collections::BTreeMap;
 
 /// Points of a figure; with more frames, each is the median of several.
 const MAX_POINTS: usize = 400;
-/// Longer runs have their dates in days, shorter ones in hours.
-const LONG_DAYS: f64 = 2.0;
 
 const NO_PICTURES: &str =
     "There are no pictures of the frames that failed: none of them can be read where it was.";
@@ -26,7 +24,7 @@ pub(super) fn build(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result
     let failed = |frame: &FrameSummary| !frame.is_identified();
     let reasons = reasons(frames.iter().filter(|frame| failed(frame)));
     let mut notes = notes(archive, &frames, &reasons)?;
-    let figures = limits(&frames)?;
+    let figures = limits(&frames);
     let mut tables = Vec::new();
     if !reasons.is_empty() {
         let csv = csv_table(reasons.iter())?;
@@ -161,54 +159,56 @@ fn notes(
 }
 
 /// The limits over time, if dates and limits are known.
-fn limits(frames: &[FrameSummary]) -> anyhow::Result<Vec<PageFigure>> {
+fn limits(frames: &[FrameSummary]) -> Vec<PageFigure> {
     let mut dated: Vec<(f64, &FrameSummary)> = frames
         .iter()
         .filter(|frame| frame.limit50_vmag.is_some())
         .filter_map(|frame| Some((frame.t_min?, frame)))
         .collect();
     dated.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let ([(first, _), ..], Some((last, _))) = (&dated[..], dated.last()) else {
-        return Ok(Vec::new());
-    };
-    let (unit, scale) = if last - first > LONG_DAYS {
-        ("days", 1.0)
-    } else {
-        ("hours", 24.0)
-    };
+    if dated.is_empty() {
+        return Vec::new();
+    }
     let together = dated.len().div_ceil(MAX_POINTS);
     let points = |value: fn(&FrameSummary) -> Option<f64>| -> Vec<(f64, f64)> {
         let point = |chunk: &[(f64, &FrameSummary)]| {
             let known = chunk
                 .iter()
                 .filter_map(|(date, frame)| Some((date, value(frame)?)));
-            let (mut times, mut values): (Vec<f64>, Vec<f64>) = known
-                .map(|(date, value)| (scale * (date - first), value))
-                .unzip();
+            let (mut times, mut values): (Vec<f64>, Vec<f64>) = known.unzip();
             (!values.is_empty()).then(|| (median(&mut times), median(&mut values)))
         };
         dated.chunks(together).filter_map(point).collect()
     };
+    let measured = points(|frame| frame.limit50_vmag).into_iter();
     let mut layers = vec![PlotLayer::new(
         "measured",
-        BLUE,
-        Marks::Points(points(|frame| frame.limit50_vmag)),
+        Rgb::BLUE,
+        Marks::Dots(measured.map(Dot::from).collect()),
     )];
     let predicted = points(|frame| frame.predicted_limit50_vmag);
     if !predicted.is_empty() {
-        layers.push(PlotLayer::new("predicted", ORANGE, Marks::Line(predicted)));
+        layers.push(PlotLayer::new(
+            "predicted",
+            Rgb::ORANGE,
+            Marks::Line(predicted),
+        ));
     }
     let panel = Panel {
         title: "Half of the stars are found at".to_owned(),
-        x: Axis::new(format!("{unit} since the first frame")),
-        y: Axis::new("V"),
+        x: Axis {
+            spacing: Spacing::Time,
+            ..Axis::new("UTC")
+        },
+        y: Axis::new("V magnitude"),
         layers,
+        ..Panel::default()
     };
     let caption = match together {
         1 => "Limiting magnitude of each frame over time".to_owned(),
         n => format!("Limiting magnitude over time; each point is the median of {n} frames"),
     };
-    Ok(vec![figure(&Sheet::of_one(panel), &caption)?])
+    vec![figure(&Sheet::of_one(panel), &caption)]
 }
 
 /// What the tables depend on.

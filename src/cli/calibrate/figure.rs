@@ -1,8 +1,10 @@
 //! The figure of a calibration: stars over the frame, and their mean residuals.
 
-use crate::cli::plot::{Axis, BLACK, BLUE, FilledRectangle, Marks, Panel, PlotLayer, Sheet};
-use plotters::style::RGBColor;
+use starpipe::base::format::counted;
 use starpipe::identify::lens::{Coverage, CoverageCell, LensCalibration};
+use starpipe::report::figure::{
+    Area, Axis, ColorScale, Dot, Marks, Panel, PanelKind, PlotLayer, Rgb, Sheet,
+};
 
 /// Length of the longest arrow, in cells.
 const LONGEST: f64 = 0.9;
@@ -19,7 +21,7 @@ fn axes(coverage: &Coverage) -> [Axis; 2] {
     let [width, height] = size_px(coverage);
     [
         Axis::new("x (px)").within(0.0, width),
-        Axis::new("−y (px)").within(-height, 0.0),
+        Axis::new("y (px)").within(height, 0.0),
     ]
 }
 
@@ -47,36 +49,41 @@ fn stars(coverage: &Coverage) -> Panel {
         .max()
         .unwrap_or(0)
         .max(1);
+    let scale = ColorScale {
+        title: "stars".to_owned(),
+        ends: [0.0, most as f64],
+        is_log: false,
+        // From white without stars to blue.
+        palette: |part| Rgb::PAPER.mixed(Rgb::BLUE, part),
+    };
     let half = half_cell_px(coverage);
     let cell = |of: &CoverageCell| {
-        let [x, y] = of.centre_px;
-        // From white without stars to blue.
-        let share = of.stars as f64 / most as f64;
-        let mixed = |to: u8| (255.0 + (f64::from(to) - 255.0) * share).round() as u8;
-        FilledRectangle {
-            x: [x - half[0], x + half[0]],
-            y: [-y - half[1], -y + half[1]],
-            color: RGBColor(mixed(BLUE.0), mixed(BLUE.1), mixed(BLUE.2)),
+        let across = |axis: usize| {
+            [
+                of.centre_px[axis] - half[axis],
+                of.centre_px[axis] + half[axis],
+            ]
+        };
+        Area {
+            note: counted(of.stars, "star"),
+            ..Area::rectangle(across(0), across(1), scale.color(of.stars as f64))
         }
     };
-    let [x, y] = axes(coverage);
+    let cells = coverage.cells.iter().map(cell).collect();
     let counts = coverage.cells.iter().map(|cell| {
-        (
-            cell.centre_px[0],
-            -cell.centre_px[1],
-            cell.stars.to_string(),
-        )
+        let [x, y] = cell.centre_px;
+        (x, y, cell.stars.to_string())
     });
-    // From left to right and then upwards.
-    let rows = coverage.cells.chunks(coverage.columns).rev().flatten();
+    let [x, y] = axes(coverage);
     Panel {
         title: format!("Stars in {:.0} % of the frame", 100.0 * coverage.share()),
         x,
         y,
         layers: vec![
-            PlotLayer::unnamed(BLACK, Marks::Cells(rows.map(cell).collect())),
-            PlotLayer::unnamed(BLACK, Marks::Texts(counts.collect())),
+            PlotLayer::colored(cells, scale),
+            PlotLayer::unnamed(Rgb::BLACK, Marks::Texts(counts.collect())),
         ],
+        kind: PanelKind::Map,
     }
 }
 
@@ -89,18 +96,21 @@ fn residuals(measured: &LensCalibration) -> Panel {
     let scale = LONGEST * 2.0 * half_cell_px(coverage)[0] / longest_px.max(1e-9);
     let arrow = |cell: &CoverageCell| {
         let ([x, y], [dx, dy]) = (cell.centre_px, cell.mean_px);
-        vec![(x, -y), (x + scale * dx, -(y + scale * dy))]
+        vec![(x, y), (x + scale * dx, y + scale * dy)]
     };
     let [x, y] = axes(coverage);
-    // Where an arrow begins.
-    let tails = known().map(|cell| (cell.centre_px[0], -cell.centre_px[1], "·".to_owned()));
+    let tails = known().map(|cell| Dot {
+        note: format!("{:.3} px, {:.3} px", cell.mean_px[0], cell.mean_px[1]),
+        ..Dot::from((cell.centre_px[0], cell.centre_px[1]))
+    });
     Panel {
-        title: format!("Mean residuals, the longest {longest_px:.3} px"),
+        title: format!("Mean residuals, from the dots; the longest {longest_px:.3} px"),
         x,
         y,
         layers: vec![
-            PlotLayer::unnamed(BLUE, Marks::Lines(known().map(arrow).collect())),
-            PlotLayer::unnamed(BLACK, Marks::Texts(tails.collect())),
+            PlotLayer::unnamed(Rgb::BLUE, Marks::Lines(known().map(arrow).collect())),
+            PlotLayer::unnamed(Rgb::BLUE, Marks::Dots(tails.collect())),
         ],
+        kind: PanelKind::Map,
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn build(
         figures: vec![figure(
             &sheet(measured),
             "Where in the frame the stars are, and their mean residuals there",
-        )?],
+        )],
         thumbnails_title: "Frames that are left out".to_owned(),
         thumbnails: thumbnails(left_out),
         tables,

@@ -1,8 +1,8 @@
 //! The figures of dark frames: how many pixels have which level, and which noise.
 
-use crate::cli::plot::{Axis, BLUE, Marks, Panel, PlotLayer, Sheet};
 use starpipe::base::format::{counted, five_digits};
 use starpipe::calibration::darks::Darks;
+use starpipe::report::figure::{Axis, Marks, Panel, PlotLayer, Rgb, Sheet};
 
 /// Bars, at most.
 const BARS: usize = 60;
@@ -72,14 +72,12 @@ fn histogram(title: &str, axis: &str, values: &[f32], step: f64) -> Option<Panel
     Some(Panel {
         title: format!("{title}; {} beyond", counted(beyond, "pixel")),
         x: Axis::new(axis).within(low, high),
-        y: Axis {
-            from: Some(0.0),
-            ..Axis::new("pixels")
-        },
+        y: Axis::new("pixels").beginning_at(0.0),
         layers: vec![PlotLayer::unnamed(
-            BLUE,
+            Rgb::BLUE,
             Marks::Bars(counts.iter().enumerate().map(bar).collect()),
         )],
+        ..Panel::default()
     })
 }
 

@@ -25,7 +25,7 @@ pub(super) fn build(darks: &Darks, unread: usize) -> anyhow::Result<PageContent>
         vec![page::figure(
             &drawing,
             "How many pixels have which mean level, and which noise from frame to frame",
-        )?]
+        )]
     };
     let mut tables = vec![page::table("Frames", &csv_table(darks.frame_rows())?)?];
     if !darks.hot_pixels.is_empty() {

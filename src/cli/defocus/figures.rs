@@ -1,29 +1,18 @@
 //! The figures: errors over radius and noise, sections, best radius, accuracy and limit; and those
 //! of the paper, its spots and its surface.
 
-use crate::cli::plot::{
-    Axis, BLACK, BLUE, ColorScale, Dot, FigureForm, FilledRectangle, Marks, ORANGE, Panel,
-    PlotLayer, Sheet, WHITE, figure_files, two_digits,
-};
-use plotters::style::RGBColor;
+use crate::cli::plot::{FigureForm, figure_files};
 use starpipe::base::format::five_digits;
 use starpipe::lab::defocus::{ErrorCurve, ErrorPoint, ExpectedError, IsoLine, PeakStudy, Surface};
 use starpipe::lab::spot_radius::{
     DefocusReport, DefocusStar, DefocusStarReport, PredictedError, StarStudy,
 };
+use starpipe::report::figure::{
+    Area, Axis, ColorScale, Dot, Marks, Panel, PanelKind, PlotLayer, Rgb, Sheet, grey, sequential,
+};
 
 /// Colors of a few lines that everybody can tell apart.
-const COLORS: [RGBColor; 4] = [BLUE, ORANGE, RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
-/// Colors from the least error to the largest: dark blue to yellow, in even steps of lightness.
-const SCALE: [[f64; 3]; 5] = [
-    [68.0, 1.0, 84.0],
-    [59.0, 82.0, 139.0],
-    [33.0, 145.0, 140.0],
-    [94.0, 201.0, 98.0],
-    [253.0, 231.0, 37.0],
-];
-/// Number of shades; neighboring cells of one shade are drawn as one.
-const SHADES: f64 = 40.0;
+const COLORS: [Rgb; 4] = [Rgb::BLUE, Rgb::ORANGE, Rgb::GREEN, Rgb::PURPLE];
 /// Radii of the paper's figure 1, in pixels.
 const PAPER_SPOTS_PX: [f64; 2] = [0.6, 1.5];
 /// Lines in a section.
@@ -73,6 +62,11 @@ fn noise_axis(report: &DefocusReport) -> Axis {
     axis.within(from, to)
 }
 
+/// A number as figures name a line.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
 /// A noise with its unit; a part of full scale has none.
 fn noise_label(report: &DefocusReport, noise: f64) -> String {
     let number = five_digits(two_digits(noise));
@@ -111,17 +105,18 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
         let paper = paper.map(|line| paper_line(study, line.rms_px)).collect();
         layers.push(PlotLayer::new(
             "the paper's surface",
-            ORANGE,
+            Rgb::ORANGE,
             Marks::Lines(paper),
         ));
     }
-    layers.push(PlotLayer::unnamed(WHITE, Marks::Lines(lines)));
-    layers.push(PlotLayer::unnamed(BLACK, labels));
+    layers.push(PlotLayer::unnamed(Rgb::PAPER, Marks::Lines(lines)));
+    layers.push(PlotLayer::unnamed(Rgb::BLACK, labels));
     Panel {
         title: title_of(study, "error of a centroid, with lines of equal error"),
         x: noise_axis(report),
         y: radius_axis(report),
         layers,
+        ..Panel::default()
     }
 }
 
@@ -190,33 +185,32 @@ fn spot(experiment: &PeakStudy, spot_px: f64) -> Panel {
     let half = experiment.half_window_px as f64;
     let pixels = experiment.pixels(spot_px);
     let side = 2 * experiment.half_window_px + 1;
-    let cell = |(number, value): (usize, &f64)| {
-        let [column, row] = [number % side, number / side].map(|i| i as f64 - half);
-        FilledRectangle {
-            x: [column - 0.5, column + 0.5],
-            y: [row - 0.5, row + 0.5],
-            color: grey(value / experiment.peak),
-        }
-    };
-    let cells = pixels.iter().enumerate().map(cell).collect();
     let levels = ColorScale {
         title: "level".to_owned(),
         ends: [0.0, experiment.peak],
         is_log: false,
-        color_of: grey,
+        palette: grey,
     };
+    let cell = |(number, value): (usize, &f64)| {
+        let around = |i: usize| [i as f64 - half - 0.5, i as f64 - half + 0.5];
+        Area {
+            note: five_digits(*value),
+            ..Area::rectangle(
+                around(number % side),
+                around(number / side),
+                levels.color(*value),
+            )
+        }
+    };
+    let cells = pixels.iter().enumerate().map(cell).collect();
+    let edge = half + 0.5;
     Panel {
         title: format!("a spot of radius {} px", five_digits(spot_px)),
-        x: Axis::new("column (px)"),
-        y: Axis::new("row (px)"),
+        x: Axis::new("column (px)").within(-edge, edge),
+        y: Axis::new("row (px)").within(-edge, edge),
         layers: vec![PlotLayer::colored(cells, levels)],
+        kind: PanelKind::Map,
     }
-}
-
-/// From black at 0 to white at 1.
-fn grey(part: f64) -> RGBColor {
-    let level = (255.0 * part).round() as u8;
-    RGBColor(level, level, level)
 }
 
 /// A surface in the colors of the errors: the paper's figure 3.
@@ -227,6 +221,7 @@ fn fitted(report: &DefocusReport, study: &StarStudy, whose: &str, surface: &Surf
         x: noise_axis(report),
         y: radius_axis(report),
         layers: vec![PlotLayer::colored(cells(study, value), scale(study))],
+        ..Panel::default()
     }
 }
 
@@ -252,6 +247,7 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
         x: radius_axis(report),
         y: Axis::log("error (px)", true),
         layers: layers.collect(),
+        ..Panel::default()
     }
 }
 
@@ -264,45 +260,41 @@ fn color_range_px(study: &StarStudy) -> [f64; 2] {
     [at(1).unwrap_or(1e-3), at(19).unwrap_or(1.0)]
 }
 
+/// One of a few colors: neighboring cells of one shade are drawn as one.
+fn shade(part: f64) -> Rgb {
+    const SHADES: f64 = 40.0;
+    sequential((part.clamp(0.0, 1.0) * SHADES).round() / SHADES)
+}
+
 /// The colors of errors.
 fn scale(study: &StarStudy) -> ColorScale {
     ColorScale {
         title: "error (px)".to_owned(),
         ends: color_range_px(study),
         is_log: true,
-        color_of,
+        palette: shade,
     }
 }
 
 /// The grid as cells, with the colors of the errors that `error_px` gives; those beside each other
 /// with one shade are one cell.
-fn cells(
-    study: &StarStudy,
-    error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>,
-) -> Vec<FilledRectangle> {
+fn cells(study: &StarStudy, error_px: impl Fn(f64, f64, &ErrorPoint) -> Option<f64>) -> Vec<Area> {
     let grid = &study.errors.grid;
-    let [least, most] = color_range_px(study);
+    let scale = scale(study);
     let (columns, rows) = (edges(&grid.noises), edges(&grid.spots_px));
-    let mut cells: Vec<FilledRectangle> = Vec::new();
+    let mut cells = Vec::new();
     for (row, points) in study.errors.points.chunks(grid.noises.len()).enumerate() {
-        let mut last_shade = None;
-        for (column, point) in points.iter().enumerate() {
-            let shade = error_px(grid.spots_px[row], grid.noises[column], point).map(|error_px| {
-                let part = (error_px.max(least) / least).ln() / (most / least).ln();
-                (part.clamp(0.0, 1.0) * SHADES).round()
-            });
-            match (cells.last_mut(), shade) {
-                (Some(cell), Some(_)) if column > 0 && shade == last_shade => {
-                    cell.x[1] = columns[column + 1];
-                }
-                (_, Some(shade)) => cells.push(FilledRectangle {
-                    x: [columns[column], columns[column + 1]],
-                    y: [rows[row], rows[row + 1]],
-                    color: color_of(shade / SHADES),
-                }),
-                (_, None) => (),
-            }
-            last_shade = shade;
+        let colors = points.iter().enumerate().map(|(column, point)| {
+            let error_px = error_px(grid.spots_px[row], grid.noises[column], point)?;
+            Some(scale.color(error_px))
+        });
+        let colors: Vec<Option<Rgb>> = colors.collect();
+        let mut column = 0;
+        for alike in colors.chunk_by(|a, b| a == b) {
+            let x = [columns[column], columns[column + alike.len()]];
+            let y = [rows[row], rows[row + 1]];
+            cells.extend(alike[0].map(|color| Area::rectangle(x, y, color)));
+            column += alike.len();
         }
     }
     cells
@@ -316,16 +308,6 @@ fn edges(values: &[f64]) -> Vec<f64> {
         .chain(middles)
         .chain([last])
         .collect()
-}
-
-/// Interpolates in [`SCALE`].
-fn color_of(part: f64) -> RGBColor {
-    let place = part * (SCALE.len() - 1) as f64;
-    let below = (place as usize).min(SCALE.len() - 2);
-    let rest = place - below as f64;
-    let mixed =
-        |i: usize| (SCALE[below][i] * (1.0 - rest) + SCALE[below + 1][i] * rest).round() as u8;
-    RGBColor(mixed(0), mixed(1), mixed(2))
 }
 
 /// The error over the radius at a few noises, and over the noise at a few radii.
@@ -344,18 +326,20 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
             x: radius_axis(report),
             y: error(),
             layers: over_radius(report, study),
+            ..Panel::default()
         },
         Panel {
             title: title_of(study, "over the noise, at four radii"),
             x: noise_axis(report),
             y: error(),
             layers: over_noise(study),
+            ..Panel::default()
         },
     ]
 }
 
 /// Indices of a few of `count` values, evenly spread.
-fn a_few(count: usize) -> impl Iterator<Item = (usize, RGBColor)> {
+fn a_few(count: usize) -> impl Iterator<Item = (usize, Rgb)> {
     let few = SECTION_LINES.min(count);
     let indices = (0..few).map(move |i| (i * (count - 1)) / (few - 1).max(1));
     indices.zip(COLORS)
@@ -369,7 +353,7 @@ fn at(curve: &ErrorCurve, radius: f64) -> Option<f64> {
 
 fn over_radius(report: &DefocusReport, study: &StarStudy) -> Vec<PlotLayer> {
     let grid = &study.errors.grid;
-    let section = |(noise, color): (usize, RGBColor)| {
+    let section = |(noise, color): (usize, Rgb)| {
         let curve = study.curves[noise].as_ref()?;
         let radii = grid.spots_px.iter();
         let line = radii.filter_map(|&radius| Some((radius, at(curve, radius)?)));
@@ -382,13 +366,13 @@ fn over_radius(report: &DefocusReport, study: &StarStudy) -> Vec<PlotLayer> {
         PredictedError::Reach(reach) => (at.spot_px, reach.bound_px),
     });
     layers.push(PlotLayer::guide(Marks::Line(theory.collect())));
-    layers.push(PlotLayer::unnamed(BLACK, Marks::Dots(dots(study))));
+    layers.push(PlotLayer::unnamed(Rgb::BLACK, Marks::Dots(dots(study))));
     layers
 }
 
 fn over_noise(study: &StarStudy) -> Vec<PlotLayer> {
     let grid = &study.errors.grid;
-    let section = |(number, color): (usize, RGBColor)| {
+    let section = |(number, color): (usize, Rgb)| {
         let radius = grid.spots_px[number];
         let curves = grid.noises.iter().zip(&study.curves);
         let line = curves.filter_map(|(&noise, curve)| Some((noise, at(curve.as_ref()?, radius)?)));
@@ -407,7 +391,7 @@ fn dots(study: &StarStudy) -> Vec<Dot> {
     sound
         .map(|at| {
             let (rms, sigma) = (at.point.rms_px, at.point.rms_sigma_px);
-            (at.spot_px, rms, [rms - sigma, rms + sigma])
+            Dot::from((at.spot_px, rms, [rms - sigma, rms + sigma]))
         })
         .collect()
 }
@@ -418,7 +402,7 @@ fn best_of(star: &DefocusStarReport) -> Marks {
         let best = at.best?;
         Some((at.noise, best.spot_px, best.nearly_px))
     });
-    Marks::Dots(best.collect())
+    Marks::Dots(best.map(Dot::from).collect())
 }
 
 /// The best radius of each star over the noise.
@@ -430,6 +414,7 @@ fn best_radii(report: &DefocusReport) -> Panel {
         x: noise_axis(report),
         y: Axis::new("radius (px)"),
         layers: layers.collect(),
+        ..Panel::default()
     }
 }
 
@@ -449,11 +434,16 @@ fn radii_for_errors(report: &DefocusReport, star: &DefocusStarReport, study: &St
         x: noise_axis(report),
         y: radius_axis(report),
         layers: vec![
-            PlotLayer::new("best, to 5 % of its error", BLUE, best_of(star)),
-            PlotLayer::new("parabolas", RGBColor(150, 150, 150), parabolas),
-            PlotLayer::new("smallest for an error (px)", ORANGE, Marks::Lines(lines)),
-            PlotLayer::unnamed(BLACK, labels),
+            PlotLayer::new("best, to 5 % of its error", Rgb::BLUE, best_of(star)),
+            PlotLayer::new("parabolas", Rgb::GREY, parabolas),
+            PlotLayer::new(
+                "smallest for an error (px)",
+                Rgb::ORANGE,
+                Marks::Lines(lines),
+            ),
+            PlotLayer::unnamed(Rgb::BLACK, labels),
         ],
+        ..Panel::default()
     }
 }
 
@@ -467,10 +457,11 @@ fn accuracy_and_reach(report: &DefocusReport) -> Panel {
         layers: stars
             .flat_map(|(star, color)| accuracy_of(star, color))
             .collect(),
+        ..Panel::default()
     }
 }
 
-fn accuracy_of(star: &DefocusStarReport, color: RGBColor) -> [PlotLayer; 3] {
+fn accuracy_of(star: &DefocusStarReport, color: Rgb) -> [PlotLayer; 3] {
     const LABELLED_PX: [f64; 6] = [0.3, 0.5, 0.7, 1.0, 1.5, 2.0];
     let bound = star
         .curve

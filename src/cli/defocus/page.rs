@@ -38,7 +38,7 @@ pub(super) fn build(
     let drawn: Vec<PageFigure> = figures::sheets(report, studies)
         .iter()
         .map(|(name, sheet)| figure(sheet, caption(name)))
-        .collect::<anyhow::Result<_>>()?;
+        .collect();
     Ok(PageContent {
         title: "Radius of the spot for the best centroids".to_owned(),
         question: format!(

@@ -1,14 +1,11 @@
 //! The limiting magnitude over one parameter: a panel for each sweep, or the paper's figures.
 
 use crate::cli::exit::CommandError;
-use crate::cli::plot::{
-    Axis, BLACK, BLUE, Figure as _, Form, Marks, ORANGE, Panel, PlotLayer, Sheet,
-};
-use anyhow::Context;
 use starpipe::base::format::five_digits;
 use starpipe::predict::{
     Budget, CurveValues, PaperFigure, Scenario, Spacing, Sweep, SweepCurve, curves,
 };
+use starpipe::report::figure::{Axis, Dot, Marks, Panel, PlotLayer, Rgb, Sheet};
 
 /// Sweeps side by side.
 const SWEEPS_ABREAST: usize = 2;
@@ -23,7 +20,8 @@ pub(super) fn of_sweeps<'a>(
     let panel = |sweep: &Sweep| {
         let series = CurveValues::around(scenario, sweep.parameter);
         let curves = curves(scenario, sweep, &series).map_err(CommandError::usage)?;
-        Ok(panel(String::new(), sweep, curves, scenario))
+        let title = format!("Limiting magnitude of {}", scenario.camera.name);
+        Ok(panel(title, sweep, curves, scenario))
     };
     let panels = sweeps.map(panel).collect::<Result<_, CommandError>>()?;
     Ok(Sheet::new(panels, SWEEPS_ABREAST))
@@ -48,10 +46,10 @@ pub(super) fn of_paper(scenario: &Scenario) -> Result<Vec<(String, Vec<u8>)>, Co
     sheet.notes = notes(scenario);
     sheets.push(("figures".to_owned(), sheet));
     let files = sheets.into_iter().map(|(name, sheet)| {
-        let drawing = sheet.render(Form::Svg).context("drawing the figure")?;
-        Ok((format!("{name}.svg"), drawing))
+        let drawing = sheet.svg().into_bytes();
+        (format!("{name}.svg"), drawing)
     });
-    files.collect()
+    Ok(files.collect())
 }
 
 /// Curves over one parameter, and a dot for the scenario itself.
@@ -61,16 +59,19 @@ fn panel(title: String, sweep: &Sweep, curves: Vec<SweepCurve>, scenario: &Scena
     let dot = value
         .filter(|value| (first..=last).contains(value))
         .map(|value| (value, Budget::new(scenario).limit_vmag));
-    let curves = curves.into_iter().zip([BLUE, ORANGE]);
+    let curves = curves.into_iter().zip([Rgb::BLUE, Rgb::ORANGE]);
     let mut layers: Vec<PlotLayer> = curves
         .map(|(curve, color)| PlotLayer::new(curve.label, color, Marks::Line(curve.points)))
         .collect();
-    layers.extend(dot.map(|dot| PlotLayer::new("this camera", BLACK, Marks::Points(vec![dot]))));
+    layers.extend(
+        dot.map(|dot| PlotLayer::new("this camera", Rgb::BLACK, Marks::Dots(vec![Dot::from(dot)]))),
+    );
     Panel {
         title,
         x: Axis::log(sweep.parameter.title(), sweep.spacing == Spacing::Log).within(first, last),
         y: Axis::new("limiting magnitude (V)"),
         layers,
+        ..Panel::default()
     }
 }
 

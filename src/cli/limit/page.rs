@@ -72,7 +72,7 @@ pub(super) fn build(
             "The limit over {}; the dot is the camera as it is",
             sweep.parameter.title()
         );
-        page.figures.push(figure(&sheet, &caption)?);
+        page.figures.push(figure(&sheet, &caption));
     }
     if !given.is_empty() {
         let csv = csv_table(rows.iter().map(PredictionRow::table_row))?;

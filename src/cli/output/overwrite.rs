@@ -5,7 +5,7 @@ use crate::cli::exit::CommandError;
 use anyhow::bail;
 use starpipe::base::files;
 use starpipe::frame;
-use starpipe::report::{overlay, page, regions, sky_figure, tables, wcs};
+use starpipe::report::{figure, overlay, page, regions, tables, wcs};
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
 use std::fs;
@@ -147,7 +147,7 @@ fn begins_like_a_result(head: &[u8], extension: &str) -> bool {
         "corr" | "rdls" => frame::is_table(head),
         "vot" | "ecsv" => tables::is_text_table(head),
         "png" | "jpg" => frame::is_overlay(head),
-        "svg" => overlay::is_svg(head) || sky_figure::is_figure(head),
+        "svg" => overlay::is_svg(head) || figure::is_figure(head),
         "html" | "htm" => page::is_page(head),
         "reg" => head.starts_with(regions::FIRST_LINE.as_bytes()),
         _ => wcs::is_header(head),

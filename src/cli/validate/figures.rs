@@ -1,16 +1,15 @@
 //! The figures of a run and of a study.
 
-use crate::cli::plot::{Axis, BLUE, Dot, Marks, ORANGE, Panel, PlotLayer, Sheet};
-use plotters::style::RGBColor;
 use starpipe::base::statistics::normal_density;
 use starpipe::lab::validation::{
     AttitudeSummary, CentroidSummary, CompletenessSummary, DifferenceSummary, Histogram,
     IdentificationSummary, Pull, PullSummary, StudyRow, ValidationSummary,
 };
+use starpipe::report::figure::{Axis, Dot, Marks, Panel, PlotLayer, Rgb, Sheet};
 
 /// The 95th percentile beside the median.
-const PALE_BLUE: RGBColor = RGBColor(120, 180, 220);
-const PALE_ORANGE: RGBColor = RGBColor(240, 170, 110);
+const PALE_BLUE: Rgb = Rgb([120, 180, 220]);
+const PALE_ORANGE: Rgb = Rgb([240, 170, 110]);
 
 /// The figures of a run with their names.
 pub(super) fn of_run(summary: &ValidationSummary) -> Vec<(&'static str, Sheet)> {
@@ -40,7 +39,7 @@ fn identification(found: &IdentificationSummary) -> Sheet {
         .map(|bin| {
             let middle = 0.5 * (bin.from_stars + bin.to_stars) as f64;
             let interval = [bin.right_low_percent, bin.right_high_percent];
-            (middle, bin.right_percent, interval)
+            Dot::from((middle, bin.right_percent, interval))
         })
         .collect();
     let lowest = lowest_percent(&dots);
@@ -50,22 +49,20 @@ fn identification(found: &IdentificationSummary) -> Sheet {
             "Identified correctly: {} of {} frames; {} not identified, {} wrong",
             all.right, all.frames, all.none, all.wrong
         ),
-        x: Axis {
-            from: Some(0.0),
-            ..Axis::new("stars brighter than the predicted limit")
-        },
-        y: Axis::new("% of the frames").within(lowest, 100.5),
+        x: Axis::new("stars brighter than the predicted limit").beginning_at(0.0),
+        y: Axis::new("% of the frames").within(lowest, 100.0),
         layers: vec![PlotLayer::new(
             "with 95 % intervals (Clopper-Pearson)",
-            BLUE,
+            Rgb::BLUE,
             Marks::Dots(dots),
         )],
+        ..Panel::default()
     })
 }
 
 /// The start of an axis of rates: below all intervals.
 fn lowest_percent(rates: &[Dot]) -> f64 {
-    let lowest = rates.iter().map(|rate| rate.2[0]);
+    let lowest = rates.iter().filter_map(|rate| Some(rate.y_range?[0]));
     lowest.fold(90.0, f64::min).floor()
 }
 
@@ -88,17 +85,18 @@ fn completeness(found: &CompletenessSummary) -> Sheet {
     };
     Sheet::of_one(Panel {
         title,
-        x: Axis::new("V"),
-        y: Axis::new("% of isolated stars found").within(0.0, 103.0),
+        x: Axis::new("V magnitude"),
+        y: Axis::new("% of isolated stars found").within(0.0, 100.0),
         layers: vec![
             PlotLayer::guide(Marks::Levels(vec![50.0])),
-            PlotLayer::new("predicted", ORANGE, Marks::Line(line.collect())),
+            PlotLayer::new("predicted", Rgb::ORANGE, Marks::Line(line.collect())),
             PlotLayer::new(
                 "found, with 95 % intervals",
-                BLUE,
-                Marks::Dots(dots.collect()),
+                Rgb::BLUE,
+                Marks::Dots(dots.map(Dot::from).collect()),
             ),
         ],
+        ..Panel::default()
     })
 }
 
@@ -119,7 +117,7 @@ fn centroids(found: &CentroidSummary) -> Sheet {
         .iter()
         .filter_map(|bin| {
             let (ratio, sigma) = (bin.ratio?, bin.ratio_sigma?);
-            Some((bin.snr, ratio, [ratio - sigma, ratio + sigma]))
+            Some(Dot::from((bin.snr, ratio, [ratio - sigma, ratio + sigma])))
         })
         .collect();
     let snr = || Axis::log("signal-to-noise ratio of the matched filter", true);
@@ -130,9 +128,18 @@ fn centroids(found: &CentroidSummary) -> Sheet {
                 x: snr(),
                 y: Axis::log("root mean square (px)", true),
                 layers: vec![
-                    PlotLayer::new("Cramér-Rao bound", ORANGE, Marks::Line(bound.collect())),
-                    PlotLayer::new("measured", BLUE, Marks::Dots(errors.collect())),
+                    PlotLayer::new(
+                        "Cramér-Rao bound",
+                        Rgb::ORANGE,
+                        Marks::Line(bound.collect()),
+                    ),
+                    PlotLayer::new(
+                        "measured",
+                        Rgb::BLUE,
+                        Marks::Dots(errors.map(Dot::from).collect()),
+                    ),
                 ],
+                ..Panel::default()
             },
             Panel {
                 title: "The same in units of the bound".to_owned(),
@@ -140,8 +147,9 @@ fn centroids(found: &CentroidSummary) -> Sheet {
                 y: Axis::new("measured / bound"),
                 layers: vec![
                     PlotLayer::guide(Marks::Levels(vec![1.0])),
-                    PlotLayer::new("± standard error", BLUE, Marks::Dots(ratios)),
+                    PlotLayer::new("± standard error", Rgb::BLUE, Marks::Dots(ratios)),
                 ],
+                ..Panel::default()
             },
         ],
         2,
@@ -174,22 +182,20 @@ fn pulls(found: &PullSummary) -> Sheet {
             pull.mean, pull.sd
         ),
         x: Axis::new("error / stated standard error").within(-5.0, 5.0),
-        y: Axis {
-            from: Some(0.0),
-            ..Axis::new("density")
-        },
+        y: Axis::new("density").beginning_at(0.0),
         layers: vec![
             PlotLayer::new(
                 format!("{} values", pull.count),
-                BLUE,
+                Rgb::BLUE,
                 Marks::Bars(densities(&pull.histogram, pull.count)),
             ),
             PlotLayer::new(
                 "standard normal",
-                ORANGE,
+                Rgb::ORANGE,
                 Marks::Line(normal_curve(5.0, 1.0)),
             ),
         ],
+        ..Panel::default()
     };
     let panels = [
         ("x", &found.x),
@@ -205,13 +211,13 @@ fn pulls(found: &PullSummary) -> Sheet {
 fn faintest(found: &DifferenceSummary) -> Sheet {
     let mut layers = vec![PlotLayer::new(
         format!("{} frames", found.count),
-        BLUE,
+        Rgb::BLUE,
         Marks::Bars(densities(&found.histogram, found.count)),
     )];
     if let Some(sd) = found.expected_sd.filter(|sd| *sd > 0.0) {
         let curve = normal_curve(1.5, sd);
         let label = format!("expected, as if normal: scatter {sd:.2}");
-        layers.push(PlotLayer::new(label, ORANGE, Marks::Line(curve)));
+        layers.push(PlotLayer::new(label, Rgb::ORANGE, Marks::Line(curve)));
     }
     Sheet::of_one(Panel {
         title: format!(
@@ -219,11 +225,9 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
             found.mean, found.mean_sigma, found.sd
         ),
         x: Axis::new("faintest star named minus the faintest expected (mag)").within(-1.5, 1.5),
-        y: Axis {
-            from: Some(0.0),
-            ..Axis::new("density (1 / mag)")
-        },
+        y: Axis::new("density (1 / mag)").beginning_at(0.0),
         layers,
+        ..Panel::default()
     })
 }
 
@@ -237,20 +241,21 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
     let (boresight, roll) = (&found.boresight_arcsec, &found.roll_arcsec);
     Sheet::of_one(Panel {
         title: format!("Errors of the attitude, of {} frames", found.frames),
-        x: Axis::log("arcseconds", true),
-        y: Axis::new("% of the frames are off by less").within(0.0, 102.0),
+        x: Axis::log("error (arcsec)", true),
+        y: Axis::new("% of the frames are off by less").within(0.0, 100.0),
         layers: vec![
             PlotLayer::new(
                 format!("boresight: half below {:.2}″", boresight.p50),
-                BLUE,
+                Rgb::BLUE,
                 cumulative(&found.boresight_percentiles_arcsec),
             ),
             PlotLayer::new(
                 format!("roll: half below {:.1}″", roll.p50),
-                ORANGE,
+                Rgb::ORANGE,
                 cumulative(&found.roll_percentiles_arcsec),
             ),
         ],
+        ..Panel::default()
     })
 }
 
@@ -264,13 +269,14 @@ fn study(rows: &[StudyRow]) -> Sheet {
         x: Axis::log(rows[0].title.clone(), rows[0].is_log),
         y,
         layers,
+        ..Panel::default()
     };
     let (rate, rates) = rates(rows);
     let panels = vec![
         panel("Identified correctly", rate, rates),
         panel(
             "Half of the stars are found at",
-            Axis::new("V"),
+            Axis::new("V magnitude"),
             limits(rows),
         ),
         panel(
@@ -285,7 +291,7 @@ fn study(rows: &[StudyRow]) -> Sheet {
         ),
         panel(
             "Errors of the attitude",
-            Axis::log("arcseconds", true),
+            Axis::log("error (arcsec)", true),
             attitude_errors(rows),
         ),
     ];
@@ -295,18 +301,18 @@ fn study(rows: &[StudyRow]) -> Sheet {
 fn rates(rows: &[StudyRow]) -> (Axis, Vec<PlotLayer>) {
     let rate = |row: &StudyRow| {
         let interval = [row.right_low_percent, row.right_high_percent];
-        (row.value, row.right_percent, interval)
+        Dot::from((row.value, row.right_percent, interval))
     };
     let rates: Vec<Dot> = rows.iter().map(rate).collect();
-    let axis = Axis::new("% of the frames").within(lowest_percent(&rates), 100.5);
-    let layer = PlotLayer::new("with 95 % intervals", BLUE, Marks::Dots(rates));
+    let axis = Axis::new("% of the frames").within(lowest_percent(&rates), 100.0);
+    let layer = PlotLayer::new("with 95 % intervals", Rgb::BLUE, Marks::Dots(rates));
     (axis, vec![layer])
 }
 
 fn limits(rows: &[StudyRow]) -> Vec<PlotLayer> {
     let predicted = line(rows, |row| Some(row.predicted_limit_vmag));
     vec![
-        PlotLayer::new("predicted", ORANGE, predicted),
+        PlotLayer::new("predicted", Rgb::ORANGE, predicted),
         measured("measured", rows, |row| {
             (row.measured_limit_vmag, row.measured_limit_sigma_mag)
         }),
@@ -316,9 +322,13 @@ fn limits(rows: &[StudyRow]) -> Vec<PlotLayer> {
 fn attitude_errors(rows: &[StudyRow]) -> Vec<PlotLayer> {
     let line = |value| line(rows, value);
     vec![
-        PlotLayer::new("boresight 50 %", BLUE, line(|row| row.boresight_p50_arcsec)),
+        PlotLayer::new(
+            "boresight 50 %",
+            Rgb::BLUE,
+            line(|row| row.boresight_p50_arcsec),
+        ),
         PlotLayer::new("95 %", PALE_BLUE, line(|row| row.boresight_p95_arcsec)),
-        PlotLayer::new("roll 50 %", ORANGE, line(|row| row.roll_p50_arcsec)),
+        PlotLayer::new("roll 50 %", Rgb::ORANGE, line(|row| row.roll_p50_arcsec)),
         PlotLayer::new("95 %", PALE_ORANGE, line(|row| row.roll_p95_arcsec)),
     ]
 }
@@ -334,7 +344,11 @@ fn measured(label: &str, rows: &[StudyRow], value: Measured) -> PlotLayer {
         let (Some(value), Some(sigma)) = value(row) else {
             return None;
         };
-        Some((row.value, value, [value - sigma, value + sigma]))
+        Some(Dot::from((
+            row.value,
+            value,
+            [value - sigma, value + sigma],
+        )))
     });
-    PlotLayer::new(label, BLUE, Marks::Dots(dots.collect()))
+    PlotLayer::new(label, Rgb::BLUE, Marks::Dots(dots.collect()))
 }

@@ -5,12 +5,12 @@ use super::frames::{FailedFrames, MOST_ROWS, RunFrameRow};
 use super::run::ValidationRun;
 use crate::cli::output::rows::csv_table;
 use crate::cli::page::{catalog, codes_note, figure, options, table};
-use crate::cli::plot::Sheet;
 use serde::Serialize;
 use starpipe::base::format::{counted, five_digits};
 use starpipe::catalog::Catalog;
 use starpipe::lab::night_sky::SkySummary;
 use starpipe::lab::validation::{HardRow, Pull, StudyRow, ValidationSummary};
+use starpipe::report::figure::Sheet;
 use starpipe::report::page::{Fact, PageContent, PageTable};
 use std::collections::BTreeMap;
 
@@ -45,7 +45,7 @@ pub(super) fn of_run(run: ValidationRun) -> anyhow::Result<PageContent> {
         ..PageContent::default()
     };
     for (name, sheet) in figures::of_run(&summary) {
-        page.figures.push(figure(&sheet, caption(name))?);
+        page.figures.push(figure(&sheet, caption(name)));
     }
     Ok(page)
 }
@@ -93,7 +93,7 @@ pub(super) fn of_sky(
         figures: vec![figure(
             sheet,
             "Errors of the sky, and what its probabilities are worth",
-        )?],
+        )],
         tables: vec![
             table("Groups", &csv_table(summary.groups.iter())?)?,
             table(
@@ -129,7 +129,7 @@ pub(super) fn of_study(
     };
     for (name, sheet) in figures::of_study(rows) {
         let caption = format!("Identification, limit and errors over {name}");
-        page.figures.push(figure(&sheet, &caption)?);
+        page.figures.push(figure(&sheet, &caption));
     }
     with_runs(page, &runs, failed)
 }

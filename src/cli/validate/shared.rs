@@ -2,9 +2,10 @@
 
 use crate::cli::output::files::{generated, write_into};
 use crate::cli::output::messages::report;
-use crate::cli::plot::{FigureForm, Sheet, figure_files};
+use crate::cli::plot::{FigureForm, figure_files};
 use indicatif::ProgressBar;
 use starpipe::identify::IndexedCatalog;
+use starpipe::report::figure::Sheet;
 use std::cell::Cell;
 use std::fmt::Display;
 use std::path::Path;

@@ -5,10 +5,10 @@ use crate::cli::batch::try_for_each_ordered;
 use crate::cli::exit::CommandError;
 use crate::cli::output::messages::report_warning;
 use crate::cli::output::rows::{csv_table, json_indented};
-use crate::cli::plot::{Axis, BLUE, Marks, ORANGE, Panel, PlotLayer, Sheet};
 use starpipe::ephemeris::observer::Site;
 use starpipe::lab::night_sky::{SkyStudy, SkySummary, SkyTrial, TrialFrameRow};
 use starpipe::lab::validation::{ValidationProtocol, claim_directory};
+use starpipe::report::figure::{Axis, Dot, Marks, Panel, PlotLayer, Rgb, Sheet};
 use starpipe::solve::Workspace;
 use starpipe::store::Journal;
 use std::path::Path;
@@ -93,7 +93,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
     let dots = |value: fn(&TrialFrameRow) -> Option<(f64, f64, f64)>| {
         let dots = trials.iter().filter_map(|trial| value(&trial.frame));
         Marks::Dots(
-            dots.map(|(x, y, sigma)| (x, y, [y - sigma, y + sigma]))
+            dots.map(|(x, y, sigma)| Dot::from((x, y, [y - sigma, y + sigma])))
                 .collect(),
         )
     };
@@ -103,8 +103,9 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         y: Axis::new(y),
         layers: vec![
             PlotLayer::guide(Marks::Levels(vec![0.0])),
-            PlotLayer::new("frames", BLUE, marks),
+            PlotLayer::new("frames", Rgb::BLUE, marks),
         ],
+        ..Panel::default()
     };
     let zenith = dots(|row| {
         let error = row.zenith_mag_arcsec2? - row.true_zenith_mag_arcsec2;
@@ -144,9 +145,14 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
                 x: Axis::new("stated").within(0.0, 1.0),
                 y: Axis::new("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
-                    PlotLayer::new("if true", ORANGE, Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)])),
-                    PlotLayer::new("found", BLUE, Marks::Line(found.collect())),
+                    PlotLayer::new(
+                        "if true",
+                        Rgb::ORANGE,
+                        Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)]),
+                    ),
+                    PlotLayer::new("found", Rgb::BLUE, Marks::Line(found.collect())),
                 ],
+                ..Panel::default()
             },
         ],
         2,

@@ -1,11 +1,7 @@
 //! What is drawn over a picture: strokes and letters, in pixels of the picture.
 
-use super::letters::text_width;
 use crate::base::size::Size;
-
-/// Red, green and blue.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Rgb(pub(super) [u8; 3]);
+use crate::report::figure::{Anchor, DrawnShape, Halo, Letters, Rgb, Stroke, text_width};
 
 impl Rgb {
     pub(super) const WHITE: Self = Self([240, 240, 240]);
@@ -17,40 +13,6 @@ impl Rgb {
     pub(super) fn lighter(self) -> Self {
         Self(self.0.map(|c| c / 2 + 127))
     }
-}
-
-/// A line or a circle's edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stroke {
-    /// In pixels.
-    pub(super) width: f32,
-    pub(super) color: Rgb,
-    /// Length of dashes and gaps, in pixels.
-    pub(super) dash: Option<f32>,
-}
-
-/// Something that is drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum DrawnShape {
-    Circle {
-        center: [f32; 2],
-        radius: f32,
-        stroke: Stroke,
-    },
-    Line {
-        points: Vec<[f32; 2]>,
-        stroke: Stroke,
-    },
-    /// Letters with a dark border.
-    Text {
-        text: String,
-        /// Where the baseline begins.
-        at: [f32; 2],
-        size: f32,
-        /// Width of the border.
-        halo: f32,
-        color: Rgb,
-    },
 }
 
 /// A drawing over a picture. Sizes of strokes and letters are in units that suit the picture's size.
@@ -116,13 +78,21 @@ impl Canvas {
     pub(super) fn text(&mut self, text: &str, at: [f32; 2], size: f32, color: Rgb) {
         /// Width of the border, in units.
         const HALO: f32 = 3.0;
-        self.shapes.push(DrawnShape::Text {
+        let halo = Halo {
+            width: HALO * self.unit,
+            color: Rgb::BLACK,
+        };
+        self.shapes.push(DrawnShape::Text(Letters {
             text: text.to_owned(),
             at,
             size: size * self.unit,
-            halo: HALO * self.unit,
             color,
-        });
+            anchor: Anchor::Start,
+            is_upright: false,
+            halo: Some(halo),
+            // Keeps names apart in other fonts, too.
+            width: Some(self.text_width(text, size)),
+        }));
     }
 
     /// Width of `text` in letters of `size` units, in pixels.

@@ -1,9 +1,9 @@
 //! Places names, brightest stars first, where they cover neither another name nor what is marked.
 
-use super::letters::text_width;
 use super::mark::Mark;
 use super::names::StarLabel;
 use super::options::Rings;
+use crate::report::figure::text_width;
 use std::ptr;
 
 /// Size of the letters, in units of strokes.

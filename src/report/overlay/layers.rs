@@ -1,12 +1,13 @@
 //! What of the sky is drawn over a frame, layer by layer, for pages that draw it themselves.
 
-use super::canvas::{Canvas, DrawnShape};
+use super::canvas::Canvas;
 use super::labels::Room;
 use super::picture::Picture;
 use super::sky::OverlayLayer;
 use crate::base::format::to_decimals;
 use crate::base::size::Size;
 use crate::identify::Identification;
+use crate::report::figure::{DrawnShape, Letters};
 use serde::Serialize;
 
 /// A layer, in pixels of the frame.
@@ -58,7 +59,9 @@ impl SkyLayer {
                     let [x, y] = pixel(center);
                     this.circles.push([x, y, rounded(radius)]);
                 }
-                DrawnShape::Text { text, at, .. } => this.texts.push((text, pixel(at))),
+                DrawnShape::Text(Letters { text, at, .. }) => this.texts.push((text, pixel(at))),
+                // Of charts.
+                DrawnShape::Disk { .. } | DrawnShape::Polygon { .. } => (),
             }
         }
         this

@@ -1,7 +1,6 @@
 //! The strip below the frame: name, field, counts, scale bar and compass.
 
-use super::canvas::{Canvas, Rgb};
-use super::letters::text_width;
+use super::canvas::Canvas;
 use super::mark::{Mark, MarkKind};
 use super::picture::Picture;
 use crate::base::format::{counted, degrees, hours};
@@ -10,6 +9,7 @@ use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::camera::CameraModel;
 use crate::ephemeris::places::AttitudeFrame;
 use crate::identify::Identification;
+use crate::report::figure::{Rgb, text_width};
 use crate::solve::Solution;
 
 // Lengths are in units of strokes.

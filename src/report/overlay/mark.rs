@@ -1,11 +1,12 @@
 //! Detections as they are drawn.
 
-use super::canvas::{Canvas, Rgb};
+use super::canvas::Canvas;
 use super::names::StarLabel;
 use super::options::LabelKind;
 use super::picture::Picture;
 use crate::catalog::Catalog;
 use crate::ephemeris::solar_system::BodyKind;
+use crate::report::figure::Rgb;
 use crate::solve::{BodyInFrame, Solution, Source};
 
 /// Smallest and largest radius of a ring, in units of strokes.

@@ -23,7 +23,6 @@ mod labels;
 #[cfg(feature = "page")]
 mod layers;
 mod legend;
-mod letters;
 mod mark;
 mod names;
 mod options;
@@ -34,7 +33,6 @@ mod sky;
 mod svg;
 mod trails;
 
-pub use letters::FONT;
 pub use svg::is_overlay as is_svg;
 
 use crate::catalog::Catalog;

@@ -1,6 +1,5 @@
 //! Tests of pictures of drawn frames.
 
-use super::canvas::Rgb;
 use super::*;
 use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
@@ -10,6 +9,7 @@ use crate::detect::DetectionFlags;
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
+use crate::report::figure::{DrawnShape, Rgb};
 use crate::report::sample;
 use crate::solve::{Background, Measured, Outcome, Reason, Source};
 use nalgebra::Matrix3;
@@ -238,7 +238,7 @@ fn texts(sky: SkyLayers, solution: &Solution) -> Vec<String> {
         &options,
     );
     let texts = canvas.shapes.into_iter().filter_map(|shape| match shape {
-        canvas::DrawnShape::Text { text, .. } => Some(text),
+        DrawnShape::Text(letters) => Some(letters.text),
         _ => None,
     });
     texts.collect()

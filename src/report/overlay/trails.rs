@@ -1,7 +1,8 @@
 //! Draws satellites, aeroplanes and meteors: a line on each side.
 
-use super::canvas::{Canvas, Rgb};
+use super::canvas::Canvas;
 use super::picture::Picture;
+use crate::report::figure::Rgb;
 use crate::solve::Solution;
 
 const COLOR: Rgb = Rgb([140, 235, 150]);

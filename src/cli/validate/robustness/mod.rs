@@ -11,17 +11,13 @@ pub(crate) use args::RobustnessArgs;
 use crate::cli::exit::{CommandError, CommandOutput};
 use crate::cli::output::files::write_each;
 use anyhow::Context;
-use figure::RateTable;
 
 /// `starpipe validate --suite robustness`
 pub(crate) fn robustness(arguments: &RobustnessArgs) -> Result<CommandOutput, CommandError> {
     let rows = rows::run_all(arguments)?;
     let plot = arguments.plot.as_ref().map(|plot| {
-        let file = match figure::sweeps(&rows) {
-            Some(sheet) => plot.with(&sheet),
-            None => plot.with(&RateTable(&rows)),
-        };
-        file.context("drawing the figure")
+        let sheet = figure::sweeps(&rows).unwrap_or_else(|| figure::rate_table(&rows));
+        plot.with(&sheet).context("drawing the figure")
     });
     let all_written = write_each(plot);
     let table = rows.iter().map(|swept| &swept.row);

@@ -2,7 +2,8 @@
 
 use super::view::PictureView;
 use crate::catalog::objects::deep_sky;
-use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::figure::Rgb;
+use crate::report::overlay::canvas::Canvas;
 use crate::report::overlay::labels::Room;
 
 const COLOR: Rgb = Rgb([150, 220, 150]);

@@ -3,7 +3,8 @@
 use super::view::PictureView;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::catalog::objects::constellations;
-use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::figure::Rgb;
+use crate::report::overlay::canvas::Canvas;
 use crate::report::overlay::labels::Room;
 
 const COLOR: Rgb = Rgb([120, 135, 190]);

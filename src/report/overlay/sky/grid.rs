@@ -3,7 +3,8 @@
 use super::view::PictureView;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
-use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::figure::Rgb;
+use crate::report::overlay::canvas::Canvas;
 use crate::report::overlay::labels::Room;
 
 const EQUATORIAL: Rgb = Rgb([110, 130, 145]);

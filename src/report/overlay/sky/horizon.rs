@@ -2,7 +2,8 @@
 
 use super::view::PictureView;
 use crate::base::units::RAD_PER_DEG;
-use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::figure::Rgb;
+use crate::report::overlay::canvas::Canvas;
 
 /// Color of the lines.
 const COLOR: Rgb = Rgb([110, 170, 255]);

@@ -2,7 +2,8 @@
 
 use crate::base::coords::{Icrs, UnitVector};
 use crate::identify::Identification;
-use crate::report::overlay::canvas::{Canvas, Rgb};
+use crate::report::figure::Rgb;
+use crate::report::overlay::canvas::Canvas;
 use crate::report::overlay::picture::Picture;
 
 /// An identified frame's picture.

@@ -1,11 +1,11 @@
-//! The font of overlays, and the outlines of its letters.
+//! The font of drawings, and the outlines of its letters.
 
 use std::sync::OnceLock;
 use tiny_skia::{Path, PathBuilder};
 use ttf_parser::{Face, OutlineBuilder};
 
 /// Font with Latin and Greek letters; its source is in assets/README.md.
-pub static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
+static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans-subset.ttf");
 
 fn face() -> &'static Face<'static> {
     static FACE: OnceLock<Face> = OnceLock::new();
@@ -13,7 +13,7 @@ fn face() -> &'static Face<'static> {
 }
 
 /// Width of `text` in letters of this size, in the unit of `size`.
-pub(super) fn text_width(text: &str, size: f32) -> f32 {
+pub(in crate::report) fn text_width(text: &str, size: f32) -> f32 {
     let face = face();
     let scale = size / f32::from(face.units_per_em());
     let advance = |c: char| f32::from(face.glyph_hor_advance(glyph(c)).unwrap_or(0));
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn the_font_has_every_letter_that_names_and_captions_need() {
         let greek = "αβγδεζηθικλμνξοπρστυφχψω";
-        let others = "°′″−×·…²³¹⁴⁵⁶⁷⁸⁹ –éüßÅ";
+        let others = "°′″−×·…⁰¹²³⁴⁵⁶⁷⁸⁹⁻ –éüßÅ";
         let ascii: String = (' '..='~').collect();
         for c in greek.chars().chain(others.chars()).chain(ascii.chars()) {
             assert!(face().glyph_index(c).is_some(), "{c}");

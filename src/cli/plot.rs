@@ -1,11 +1,27 @@
 //! Files with figures, as options name them.
 
-use super::figure::{Figure, Form};
-use super::sheet::Sheet;
 use anyhow::Context;
 use clap::ValueEnum;
 use clap::builder::{PathBufValueParser, TypedValueParser};
+use starpipe::report::figure::Sheet;
 use std::path::PathBuf;
+
+/// What a figure is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Svg,
+    Png,
+}
+
+impl Form {
+    /// The content of a file with the figure.
+    fn render(self, sheet: &Sheet) -> anyhow::Result<Vec<u8>> {
+        Ok(match self {
+            Self::Svg => sheet.svg().into_bytes(),
+            Self::Png => sheet.png()?,
+        })
+    }
+}
 
 /// A file for one figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,8 +51,8 @@ impl PlotFile {
     }
 
     /// The file and its content.
-    pub(crate) fn with(&self, figure: &impl Figure) -> anyhow::Result<(PathBuf, Vec<u8>)> {
-        Ok((self.path.clone(), figure.render(self.form)?))
+    pub(crate) fn with(&self, sheet: &Sheet) -> anyhow::Result<(PathBuf, Vec<u8>)> {
+        Ok((self.path.clone(), self.form.render(sheet)?))
     }
 }
 
@@ -62,8 +78,8 @@ pub(crate) fn figure_files(
         FigureForm::None => return Ok(Vec::new()),
     };
     let file = |(name, sheet): (&str, Sheet)| {
-        let drawing = sheet
-            .render(form)
+        let drawing = form
+            .render(&sheet)
             .with_context(|| format!("drawing {name}"))?;
         Ok((format!("{name}.{extension}"), drawing))
     };
