@@ -57,7 +57,7 @@
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
-//! | `store` | whose are the results of many frames: runs that go on after an interruption, and their tables |
+//! | `store` | results of many frames: runs that can be resumed, and their tables |
 //! | [`lab`] | is it good enough: simulated frames, validation, robustness, defocus, the papers' experiments |
 //!
 //! Pixels, angles and coordinate systems: [`conventions`].

@@ -1,4 +1,4 @@
-//! Whose results are: all that they depend on.
+//! The identity of a run: all that its results depend on.
 
 use super::configuration::Configuration;
 use super::error::StoreError;

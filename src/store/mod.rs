@@ -1,9 +1,8 @@
-//! Whose are the results of many frames? Runs that are done piece by piece and go on after an interruption, and
-//! their tables.
+//! Results of many frames: runs that can be resumed after an interruption, and their tables.
 //!
 //! 1. A directory belongs to one run: an [`Identity`] in it has all that the results depend on ([`claim()`]). Another
-//!    run is refused, and told what differs.
-//! 2. Pieces that are written whole are done, and are not done again:
+//!    run is refused, with a list of what differs.
+//! 2. Pieces that are written whole are not computed again:
 //!    - the rows of one frame after the other, as lines of JSON with checksums ([`Journal`]) or as tables of CSV that
 //!      are cut back to what is whole ([`RowReader`]);
 //!    - parts of a fixed number of frames, as Parquet ([`Plan`], and `Archive` with the feature `archive`).

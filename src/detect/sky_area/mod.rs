@@ -49,6 +49,20 @@ impl SkyArea {
         self.shown[self.cells.at(place)] == CellContent::Dark
     }
 
+    /// Whether the sky ends along a line, to one side of it: such a line is of what hides the sky.
+    pub(super) fn ends_along(&self, [begin, end]: [PixelPoint; 2]) -> bool {
+        const PLACES: [f64; 3] = [0.2, 0.5, 0.8];
+        let (dx, dy) = (end.x - begin.x, end.y - begin.y);
+        let cells = self.cells.side_px as f64 / libm::hypot(dx, dy);
+        [cells, -cells].into_iter().any(|aside| {
+            PLACES.into_iter().all(|along| {
+                let x = begin.x + along * dx - aside * dy;
+                let y = begin.y + along * dy + aside * dx;
+                !self.shows(&PixelPoint::new(x, y))
+            })
+        })
+    }
+
     /// The share of the frame that shows the sky.
     pub fn share(&self) -> f64 {
         let seen = self
@@ -101,6 +115,20 @@ mod tests {
         let (config, mut workspace) = (DetectConfig::default(), Workspace::new());
         let found = detect(&frame, &config, &mut workspace).unwrap();
         workspace.sky_area(&frame, &found)
+    }
+
+    #[test]
+    fn the_sky_ends_along_a_roof() {
+        let height = |x: f64| 300.0 + 0.3 * x;
+        let is_roof = |x: f64, y: f64| y > height(x);
+        let level = |x, y| if is_roof(x, y) { 25.0 } else { 80.0 };
+        let found = area(level, |x, y| !is_roof(x, y)).unwrap();
+        let line = |above_px: f64, slope: f64| {
+            [100.0, 400.0]
+                .map(|x| PixelPoint::new(x, height(100.0) - above_px + slope * (x - 100.0)))
+        };
+        assert!(found.ends_along(line(2.0, 0.3)));
+        assert!(!found.ends_along(line(40.0, 0.3)) && !found.ends_along(line(2.0, -0.3)));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //!
 //! Where a number stands, and what it is called, is decided once, for all figures: round numbers beside the axes,
 //! true minus signs, room around points, a legend that covers nothing. Both kinds of files are the same drawing
-//! ([`DrawnShape`]s), which overlays of photographs use as well.
+//! (`DrawnShape`), which overlays of photographs use as well.
 
 mod axis;
 mod chart;

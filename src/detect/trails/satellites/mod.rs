@@ -163,7 +163,9 @@ impl TrailSearch<'_> {
         if (end.x, end.y) < (begin.x, begin.y) {
             std::mem::swap(&mut begin, &mut end);
         }
-        is_trail.then_some(Trail {
+        let area = self.found.sky_area.as_ref();
+        let is_edge = area.is_some_and(|area| area.ends_along([begin, end]));
+        (is_trail && !is_edge).then_some(Trail {
             begin,
             end,
             width_sigma_px: ridge.width_sigma_px,
