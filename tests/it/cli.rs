@@ -101,7 +101,7 @@ fn a_wrong_command_line_ends_with_2_and_says_what_is_wrong() {
         (&["process", "--fov", "NaN", "a.png"], "NaN"),
         (&["process", "--fov", "-10", "a.png"], "--fov"),
         (&["process", "--fov", "360", "a.png"], "less than 360"),
-        (&["process", "--pixel-scale", "0", "a.png"], "pixel_scale"),
+        (&["process", "--pixel-scale", "0", "a.png"], "--pixel-scale"),
         (
             &["process", "--fov", "10", "--scale-error", "100", "a.png"],
             "--scale-error",
