@@ -16,7 +16,8 @@ impl PackedVectors {
     /// Packs the directions of `stars`.
     pub fn new(stars: &[Star]) -> Self {
         let pack = |star: &Star| {
-            let steps = |x: &f64| ((x + 1.0) / f64::from(STEP)).round() as u64;
+            // Not `round`, which is a call for each coordinate where the processor may be old.
+            let steps = |x: &f64| ((x + 1.0) / f64::from(STEP) + 0.5) as u64;
             let coordinates = star.direction.as_vector();
             coordinates
                 .iter()
