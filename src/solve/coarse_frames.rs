@@ -23,7 +23,8 @@ const MAX_DETECTIONS: usize = 1000;
 /// A frame whose stars are detected at a lower resolution, when a search asks for them.
 pub(super) struct CoarseFrames<'a> {
     frame: &'a Frame<'a>,
-    /// That of the whole frame, whose background is used again.
+    /// The detection of the whole frame. Trails are searched in front of its background later, so a coarse
+    /// frame is detected with buffers of its own.
     detector: &'a detect::Workspace,
     places: StarPlaces,
     fields: [OnceCell<Option<StarField>>; FACTORS.len()],
