@@ -82,8 +82,10 @@ class Tetra3rs:
             ms, found = clocked(lambda: self.of_sep(SEP_SIGMA[program]))
             return {"ms": ms, "found": len(found)}
         if program == "tetra3rs-fast":
-            ms, found = clocked(lambda: self.tetra3rs.extract_centroids_fast(self.image))
-            return {"ms": ms, "found": len(getattr(found, "centroids", found))}
+            if what == "point":
+                return self.solved(lambda: self.solve(self.extract_fast()))
+            ms, found = clocked(self.extract_fast)
+            return {"ms": ms, "found": len(found)}
         if what == "extract":
             ms, found = clocked(self.extract)
             return {"ms": ms, "found": len(found.centroids)}
@@ -92,9 +94,15 @@ class Tetra3rs:
             return {}
         if what in ("solve", "pointing"):
             centroids = self.centroids if what == "solve" else self.given
-            ms, solution = clocked(lambda: self.solve(centroids))
-        else:
-            ms, solution = clocked(lambda: self.solve(self.extract().centroids))
+            return self.solved(lambda: self.solve(centroids))
+        return self.solved(lambda: self.solve(self.extract().centroids))
+
+    def extract_fast(self):
+        found = self.tetra3rs.extract_centroids_fast(self.image)
+        return getattr(found, "centroids", found)
+
+    def solved(self, work):
+        ms, solution = clocked(work)
         matches = getattr(solution, "num_matches", None)
         return {
             "ms": ms,

@@ -56,7 +56,7 @@ process: process --camera fixtures/cygnus/camera.toml --exposure 1 --date 2019-1
 process: process fixtures/regression
 process: process --near 0,0 --radius 1 --fov 9 fixtures/regression/clean.tif
 process: process --camera {CAMERA} --dark OUT/calibration/master-dark-0.1s.fits --flat OUT/calibration/master-flat.fits OUT/jupiter
-process: process --attitude-only --frame-of apparent --date 2026-01-01 fixtures/regression/distorted.tif
+process: process --only pointing --frame-of apparent --date 2026-01-01 fixtures/regression/distorted.tif
 None: process --format csv --out OUT/tables fixtures/orion/orion.png
 process: identify --pixel-scale 113.7 OUT/tables/orion.csv
 process: identify --pixel-scale 10 OUT/tables/orion.csv

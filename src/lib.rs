@@ -113,7 +113,7 @@ pub use nalgebra;
 pub use report::{FrameReport, TextOptions};
 pub use solve::{
     Context, Error, Note, Outcome, Reason, Solution, SolveOptions, Source, Workspace,
-    solve_centroids, solve_file, solve_frame,
+    find_pointing_in, solve_centroids, solve_file, solve_frame,
 };
 pub use track::{Track, Tracker};
 

@@ -9,7 +9,7 @@ use starpipe::detect::{self, DetectConfig, Detections, detect_into};
 use starpipe::ephemeris::places::StarPlaces;
 use starpipe::frame::{self, Frame};
 use starpipe::identify::{self, Identification, IndexedCatalog, Priors, ScalePrior};
-use starpipe::solve::star_field;
+use starpipe::solve::{Context, Workspace, find_pointing_in, star_field};
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -26,6 +26,7 @@ struct Bench<'a> {
     frame: Frame<'static>,
     detect: detect::Workspace,
     identify: identify::Workspace,
+    solve: Workspace,
     /// Detections of the loaded frame.
     known: Detections,
     found: Detections,
@@ -76,6 +77,16 @@ impl Bench<'_> {
         (milliseconds(start), found.ok().cloned())
     }
 
+    /// The pointing alone, from pixels to the attitude.
+    fn point(&mut self, is_known: bool) -> Result<Value, Box<dyn Error>> {
+        let priors = self.priors(is_known);
+        let mut context = Context::new(&self.indexed);
+        context.priors = priors;
+        let start = Instant::now();
+        let found = find_pointing_in(&self.frame, &context, &mut self.solve)?;
+        Ok(to_json(milliseconds(start), found))
+    }
+
     /// Time of naming all stars of the loaded frame, after pointing.
     fn naming(&mut self, is_known: bool) -> (f64, Option<Identification>) {
         let priors = self.priors(is_known);
@@ -112,6 +123,7 @@ impl Bench<'_> {
                 let stars = stars.map(|s| [s.position.x, s.position.y, 10f64.powf(-0.4 * s.mag)]);
                 Ok(json!({"stars": stars.collect::<Vec<_>>()}))
             }
+            "point" => self.point(is_known),
             "whole" => {
                 let extract_ms = self.extract()?;
                 let (ms, found) = self.solve(is_known, true);
@@ -146,6 +158,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         frame: Frame::new(3, 3, vec![0.0; 9])?,
         detect: detect::Workspace::new(),
         identify: identify::Workspace::new(),
+        solve: Workspace::new(),
         known: Detections::default(),
         found: Detections::default(),
     };

@@ -151,8 +151,8 @@ def test_a_bug_that_one_frame_meets_is_its_error(pipeline, pixels, result, monke
     assert capfd.readouterr().err == ""
 
 
-def test_attitude_only_names_few(pipeline, pixels, result):
-    brief = pipeline.solve(pixels, attitude_only=True)
+def test_a_pointing_names_few(pipeline, pixels, result):
+    brief = pipeline.point(pixels)
     assert brief
     named = [sum(star["id"] is not None for star in r.to_dict()["stars"]) for r in (brief, result)]
     assert 4 <= named[0] <= named[1]

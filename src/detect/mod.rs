@@ -38,6 +38,7 @@
 
 mod background;
 mod background_map;
+mod brightest;
 mod candidates;
 mod config;
 mod contrast;
@@ -63,6 +64,7 @@ mod wings;
 mod workspace;
 
 pub use background_map::BackgroundMap;
+pub use brightest::detect_brightest_into;
 pub use config::{CentroidMethod, DetectConfig};
 pub use detection::{
     Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, StarTrails, Wings,
@@ -72,7 +74,7 @@ pub(crate) use filter_model::FilterModel;
 pub use sky_area::Circle;
 pub use sky_area::SkyArea;
 pub use trails::Trail;
-pub use workspace::Workspace;
+pub use workspace::{VisitedPixels, Workspace};
 
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{FrameBackground, Mesh};
@@ -151,6 +153,7 @@ fn run(
 ) -> Result<(), DetectError> {
     error::check(frame, config)?;
     found.clear();
+    workspace.forget_visited_pixels();
     let Workspace {
         saturation,
         saturation_adu,

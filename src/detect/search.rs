@@ -135,7 +135,8 @@ pub(crate) struct FrameSearch {
     pub filtered: FilteredFrame,
     /// Peaks and regions above the threshold.
     pub found: PeakSearch,
-    raw_peaks: RawPeakFinder,
+    /// Peaks of the frame without a filter.
+    pub raw_peaks: RawPeakFinder,
     /// A buffer.
     pub sorted: Vec<f32>,
     noise: NoiseBuffers,

@@ -1,6 +1,7 @@
 //! Buffers of detection.
 
 use super::background::FrameBackground;
+use super::brightest::BrightestStars;
 use super::detection::Detections;
 use super::measure::MeasureBuffers;
 use super::pixels::View;
@@ -12,6 +13,19 @@ use crate::base::interrupt::Interrupt;
 use crate::frame::{Frame, MIN_SIDE_PX, MemoryLimit, Pixels, SaturationFinder};
 use std::num::NonZeroUsize;
 
+/// How many pixels the stages looked at, in the last detection: of a frame of a million, two million where a
+/// stage went over it twice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct VisitedPixels {
+    /// Background and noise.
+    pub background: usize,
+    /// Peaks in single pixels.
+    pub unfiltered: usize,
+    /// The matched filter.
+    pub filtered: usize,
+}
+
 /// Buffers that are reused from frame to frame. Results do not depend on their contents.
 #[derive(Debug, Clone)]
 pub struct Workspace {
@@ -21,6 +35,7 @@ pub struct Workspace {
     pub(crate) background: FrameBackground,
     pub(crate) search: FrameSearch,
     pub(crate) measure: MeasureBuffers,
+    pub(super) brightest: BrightestStars,
     pub(super) interrupt: Interrupt,
     pub(super) memory: MemoryLimit,
     threads: NonZeroUsize,
@@ -35,6 +50,7 @@ impl Workspace {
             background: FrameBackground::default(),
             search: FrameSearch::default(),
             measure: MeasureBuffers::default(),
+            brightest: BrightestStars::default(),
             interrupt: Interrupt::default(),
             memory: MemoryLimit::default(),
             threads: NonZeroUsize::MIN,
@@ -80,6 +96,22 @@ impl Workspace {
     /// [`with_memory_limit`](Self::with_memory_limit), from the next frame on.
     pub(crate) fn set_memory(&mut self, memory: MemoryLimit) {
         self.memory = memory;
+    }
+
+    /// The pixels that the stages of the last detection looked at.
+    pub fn visited_pixels(&self) -> VisitedPixels {
+        VisitedPixels {
+            background: self.background.visited_px,
+            unfiltered: self.search.raw_peaks.visited_px,
+            filtered: self.search.filtered.visited_px,
+        }
+    }
+
+    /// Counts visited pixels anew.
+    pub(super) fn forget_visited_pixels(&mut self) {
+        self.background.visited_px = 0;
+        self.search.raw_peaks.visited_px = 0;
+        self.search.filtered.visited_px = 0;
     }
 
     /// The part of the frame that shows the sky; `frame` is the one that was searched last.

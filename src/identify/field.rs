@@ -100,12 +100,12 @@ impl StarField {
     }
 }
 
-/// The same frame at lower resolutions.
-pub trait CoarserFields {
-    /// Number of resolutions.
+/// The stars of the same frame, detected otherwise: the brightest alone, at lower resolutions.
+pub trait OtherFields {
+    /// Number of ways.
     fn count(&self) -> usize;
 
-    /// The stars at one of them, in pixels of the whole frame; `None` where there is no such frame.
+    /// The stars by one of them, in pixels of the whole frame; `None` where there are none.
     fn field(&self, number: usize) -> Option<&StarField>;
 }
 

@@ -39,7 +39,7 @@ mod search;
 mod workspace;
 
 pub use effort::Effort;
-pub(crate) use field::CoarserFields;
+pub(crate) use field::OtherFields;
 pub use field::{ObservedStar, Photometry, SourceIndex, StarField};
 pub use identification::MIN_STARS;
 pub(crate) use identification::UnknownCentre;
@@ -51,5 +51,6 @@ pub use priors::{
     DateSource, DateZone, FrameDate, Priors, Scale, ScalePrior, ScaleSource, SkyRegion,
 };
 pub use search::LOG10_FALSE_ALARM_LIMIT;
+pub(crate) use workspace::Choices;
 pub use workspace::{NAME_ODDS, PointedField};
 pub use workspace::{Workspace, identify};

@@ -8,7 +8,7 @@ use crate::camera::KnownLens;
 use crate::camera::{CameraModel, DistortionModel};
 use crate::ephemeris::places::StarPlaces;
 use crate::identify::effort::Effort;
-use crate::identify::field::{CoarserFields, StarField};
+use crate::identify::field::{OtherFields, StarField};
 use crate::identify::fit::{NamingStart, Refined, Start};
 use crate::identify::hypothesis::Problem;
 use crate::identify::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
@@ -16,8 +16,8 @@ use crate::identify::index::IndexedCatalog;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
 use crate::identify::search::{
-    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, SearchBuffers, SearchPlan, SearchWindow, Thinning,
-    Tiers, TriangleSearch, Windows,
+    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, LOG10_SURE, SearchBuffers, SearchPlan, SearchWindow,
+    Thinning, Tiers, TriangleSearch, Windows,
 };
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -33,6 +33,9 @@ const MAX_RADIUS_FRACTION: f64 = 0.0125;
 const CHANCE_PAIRS: f64 = 0.02;
 /// A fit is good if it names this share of the stars that it began with.
 const GOOD_FRACTION: f64 = 0.5;
+
+/// Stars that an attitude alone is fitted to, the brightest.
+const ATTITUDE_STARS: usize = 100;
 
 /// A name is given where the odds that it is right are at least these, unless others are stated.
 pub const NAME_ODDS: f64 = 100.0;
@@ -170,6 +173,24 @@ impl Workspace {
         self.find_pointing(field, priors, sky)?.attitude()
     }
 
+    /// [`attitude`](Self::attitude), where the first triangles of the brightest stars show it beyond doubt: what is
+    /// searched after this adds its whole false-alarm probability, and this next to nothing.
+    ///
+    /// # Errors
+    /// The [`SearchFailure`] where they do not.
+    pub(crate) fn attitude_at_once(
+        &mut self,
+        field: &StarField,
+        priors: &Priors,
+        sky: &IndexedCatalog,
+    ) -> Result<&mut Identification, SearchFailure> {
+        let pointed = self.find_pointing_by(Choices::AtOnce, field, priors, sky)?;
+        if pointed.found.log10_false_alarm > LOG10_SURE {
+            return Err(pointed.failure);
+        }
+        pointed.attitude_mut()
+    }
+
     /// Finds out where the camera points, from the brightest stars of `field`, and no more.
     ///
     /// # Errors
@@ -180,14 +201,14 @@ impl Workspace {
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
     ) -> Result<PointedField<'w, 'a>, SearchFailure> {
-        self.find_pointing_with(field, None, priors, sky)
+        self.find_pointing_by(Choices::OfField, field, priors, sky)
     }
 
-    /// [`find_pointing`](Self::find_pointing), also from the stars of the frame at lower resolutions.
-    pub(crate) fn find_pointing_with<'w: 'a, 'a>(
+    /// [`find_pointing`](Self::find_pointing) from these choices of stars.
+    pub(crate) fn find_pointing_by<'w: 'a, 'a>(
         &'w mut self,
+        tried: Choices<'a>,
         field: &'a StarField,
-        coarser: Option<&'a dyn CoarserFields>,
         priors: &Priors,
         sky: &'a IndexedCatalog<'a>,
     ) -> Result<PointedField<'w, 'a>, SearchFailure> {
@@ -208,15 +229,16 @@ impl Workspace {
             answer,
         } = self;
         let whole = Problem::new(field, sky);
-        let first = match coarser {
-            Some(_) => SearchPlan::quick(*effort),
-            None => SearchPlan::brightest(*effort),
+        let (first, other_fields) = match tried {
+            Choices::AtOnce => (SearchPlan::at_once(), None),
+            Choices::OfField => (SearchPlan::brightest(*effort), None),
+            Choices::OfFrame(other_fields) => (SearchPlan::quick(*effort), Some(other_fields)),
         };
         let mut search = TriangleSearch::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
-        if found.is_none() {
-            for choice in others.choices(whole, coarser, *effort) {
+        if found.is_none() && !matches!(tried, Choices::AtOnce) {
+            for choice in others.choices(whole, other_fields, *effort) {
                 (search, found) = choice.search(search, whole, priors);
                 let log10 = search.best_log10_false_alarm();
                 best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
@@ -247,6 +269,17 @@ impl Workspace {
     }
 }
 
+/// What is searched, one after the other.
+#[derive(Clone, Copy)]
+pub(crate) enum Choices<'a> {
+    /// Few triangles of the brightest stars of a field.
+    AtOnce,
+    /// The brightest stars of a field, and others of its stars.
+    OfField,
+    /// The same, and the stars of the frame at lower resolutions.
+    OfFrame(&'a dyn OtherFields),
+}
+
 /// What is searched besides the brightest stars of a field. Its buffers are reused.
 #[derive(Debug, Default)]
 struct Others {
@@ -260,15 +293,17 @@ impl Others {
     fn choices<'w: 'a, 'a>(
         &'w mut self,
         whole: Problem<'a>,
-        coarser: Option<&'a dyn CoarserFields>,
+        other_fields: Option<&'a dyn OtherFields>,
         effort: Effort,
     ) -> impl Iterator<Item = FurtherSearch<'a>> {
         let of = move |field| Problem { field, ..whole };
-        let coarse = coarser.into_iter().flat_map(move |coarser| {
-            let fields = (0..coarser.count()).filter_map(move |number| coarser.field(number));
+        let coarse = other_fields.into_iter().flat_map(move |other_fields| {
+            let fields =
+                (0..other_fields.count()).filter_map(move |number| other_fields.field(number));
             fields.map(move |field| FurtherSearch::new(of(field), SearchPlan::coarse(effort)))
         });
-        let of_whole = coarser.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
+        let of_whole =
+            other_fields.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
         let windows = self.windows.cut(whole.field).iter().map(move |window| {
             let plan = if window.is_main {
                 SearchPlan::coarse(effort)
@@ -384,6 +419,10 @@ impl<'w> PointedField<'w, '_> {
     /// # Errors
     /// The [`SearchFailure`] where too few stars have a sure name.
     pub fn attitude(self) -> Result<&'w Identification, SearchFailure> {
+        self.attitude_mut().map(|found| &*found)
+    }
+
+    fn attitude_mut(self) -> Result<&'w mut Identification, SearchFailure> {
         let Self {
             most_chance,
             problem: whole,
@@ -396,7 +435,7 @@ impl<'w> PointedField<'w, '_> {
         } = self;
         let searched = search.problem();
         let problem = Problem {
-            field: bright.select(searched.field, found.stars),
+            field: bright.select(searched.field, ATTITUDE_STARS),
             ..searched
         };
         let of_few = NamingStart {
@@ -438,7 +477,7 @@ fn answered<'a>(
     log10: f64,
     field: &StarField,
     pairs: &[Pair],
-) -> &'a Identification {
+) -> &'a mut Identification {
     let mut matches = answer.take().map_or_else(Vec::new, |old| old.matches);
     matches.clear();
     matches.extend(pairs.iter().map(|pair| star_match(pair, field)));

@@ -1,6 +1,7 @@
 //! What the stages need and what does not change from frame to frame.
 
 use super::fixed_camera::FixedCamera;
+use super::pointing::PointingBuffers;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
 use crate::base::interrupt::Interrupt;
@@ -175,6 +176,7 @@ pub struct Workspace {
     pub detect: detect::Workspace,
     /// For identification.
     pub identify: identify::Workspace,
+    pub(super) pointing: PointingBuffers,
     interrupt: Interrupt,
 }
 

@@ -1,10 +1,11 @@
 //! Identification of a frame's stars, with priors that may be wrong, and the reason where it fails.
 
-use super::coarse_frames::CoarseFrames;
 use super::context::{Context, Workspace};
+use super::other_stars::OtherStars;
 use super::outcome::{Outcome, Reason};
 use super::star_field::{field_of, star_field};
 use super::stopwatch::{Stage, Stopwatch};
+use crate::camera::KnownLens;
 use crate::detect::{self, DetectConfig, Detection, Detections, detect};
 use crate::ephemeris::observer::Observation;
 use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
@@ -15,10 +16,11 @@ use crate::identify::diagnosis::{
     find_repeated_sky,
 };
 use crate::identify::{
-    CoarserFields, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, Priors,
-    ScalePrior, SearchFailure, SourceIndex, StarField,
+    Choices, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, OtherFields,
+    Priors, ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched
 /// with it.
@@ -37,8 +39,14 @@ pub(super) fn identify_stars(
         ..
     } = workspace;
     let (mut found, dropped_scale) = {
-        let coarser = CoarseFrames::new(frame, detector, places);
-        search((&field, Some(&coarser)), priors, context, workspace, clock)
+        let other_fields = OtherStars::new(frame, detector, places);
+        search(
+            (&field, Some(&other_fields)),
+            priors,
+            context,
+            workspace,
+            clock,
+        )
     };
     if found.is_err() && may_be_wide(detections) {
         let is_star = |source: &Detection| source.flags.may_be_wide_star();
@@ -211,14 +219,14 @@ type Searched = (Result<Identification, SearchFailure>, Option<ScalePrior>);
 /// Searches for `field`. A scale that is not the user's and a lens that was measured are tried first, and
 /// dropped where nothing matches with them, or the stars are clearly elsewhere than this lens sees them.
 pub(super) fn search(
-    (field, coarser): (&StarField, Option<&dyn CoarserFields>),
+    (field, other_fields): (&StarField, Option<&dyn OtherFields>),
     priors: &Priors,
     context: &Context,
     workspace: &mut identify::Workspace,
     clock: &mut Stopwatch,
 ) -> Searched {
     // Names are those of detections, and without a whole search there are only those.
-    let field = (field, coarser.filter(|_| !context.attitude_only));
+    let field = (field, other_fields.filter(|_| !context.attitude_only));
     let first = attempt(field, priors, context, workspace, clock);
     let tentative = priors.scale.filter(|scale| !scale.is_binding());
     if tentative.is_none() && !priors.holds_lens {
@@ -250,16 +258,13 @@ fn is_of_other_lens(found: &Identification) -> bool {
 
 /// Pointing, then names, each timed; the pointing alone where no more is wanted.
 fn attempt(
-    (field, coarser): (&StarField, Option<&dyn CoarserFields>),
+    (field, other_fields): (&StarField, Option<&dyn OtherFields>),
     priors: &Priors,
     context: &Context,
     workspace: &mut identify::Workspace,
     clock: &mut Stopwatch,
 ) -> Result<Identification, SearchFailure> {
-    workspace.set_name_odds(context.name_odds);
-    workspace.set_effort(context.effort);
-    let lens = context.lens.as_ref().filter(|_| priors.holds_lens);
-    workspace.set_known_lens(lens);
+    let lens = prepare(workspace, priors, context);
     let finished = |found: Identification| Identification {
         lens_is_known: lens.is_some(),
         ..found
@@ -269,11 +274,25 @@ fn attempt(
         clock.lap(Stage::Pointing);
         return found.cloned().map(finished);
     }
-    let pointing = workspace.find_pointing_with(field, coarser, priors, context.indexed);
+    let choices = other_fields.map_or(Choices::OfField, Choices::OfFrame);
+    let pointing = workspace.find_pointing_by(choices, field, priors, context.indexed);
     clock.lap(Stage::Pointing);
     let found = pointing?.name_stars();
     clock.lap(Stage::Naming);
     found.cloned().map(finished)
+}
+
+/// Sets what the context wants of identification, and returns the lens that is held.
+pub(super) fn prepare<'a>(
+    workspace: &mut identify::Workspace,
+    priors: &Priors,
+    context: &'a Context,
+) -> Option<&'a Arc<KnownLens>> {
+    workspace.set_name_odds(context.name_odds);
+    workspace.set_effort(context.effort);
+    let lens = context.lens.as_ref().filter(|_| priors.holds_lens);
+    workspace.set_known_lens(lens);
+    lens
 }
 
 /// An identification at the second attempt, where it is still sure. Chance had at most twice the

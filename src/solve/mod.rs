@@ -4,16 +4,16 @@
 //!
 //! 1. The frame is read, and calibrated where the context has a calibration.
 //! 2. Its priors are resolved: the context's, then the camera's, the header's and the file name's.
-//! 3. Stars are detected, in a raw color frame after its mosaic is smoothed to grey, and identified; where they are not, the cause is sought.
-//! 4. The Moon and the planets are found where the date is known.
-//! 5. Photometry: zero point and limiting magnitude.
-//! 6. Where the context has a camera, the frame is compared with it.
-//! 7. Notes collect what is odd.
+//! 3. Where only attitude and optics are wanted, the brightest stars are asked first (`pointing`).
+//! 4. Stars are detected, in a raw color frame after its mosaic is smoothed to grey, and identified; where they are not, the cause is sought.
+//! 5. The Moon and the planets are found where the date is known.
+//! 6. Photometry: zero point and limiting magnitude.
+//! 7. Where the context has a camera, the frame is compared with it.
+//! 8. Notes collect what is odd.
 
 mod bodies;
 mod body_in_frame;
 mod bright_stars;
-mod coarse_frames;
 mod context;
 mod error;
 mod fixed_camera;
@@ -21,8 +21,10 @@ mod identification;
 mod named_options;
 mod note;
 mod options;
+mod other_stars;
 mod outcome;
 mod place_time;
+mod pointing;
 mod prepared;
 mod raw_color;
 mod solution;
@@ -45,6 +47,7 @@ pub use note::Note;
 pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};
 pub use place_time::{Change, Contradiction, PlaceTime, Proposal};
+pub use pointing::find_pointing_in;
 pub use raw_color::RawColor;
 pub use solution::{Background, Solution};
 pub use solve_list::solve_centroids;

@@ -91,6 +91,8 @@ impl SolveOptions {
             "name_odds" => number.put(&mut self.name_odds, 1.0.., ""),
             "effort" => word(text, &mut self.effort, "fast, normal or thorough"),
             "refine_lens" => put(&mut self.refine_lens, switch(text)),
+            "only" if text == "pointing" => put(&mut self.attitude_only, Ok(true)),
+            "only" => must_be("pointing", text),
             "attitude_only" => put(&mut self.attitude_only, switch(text)),
             "sky" => put(&mut self.sky, switch(text)),
             "trails" => put(&mut self.trails, switch(text)),

@@ -7,6 +7,7 @@ use super::identification::{SecondImages, identify_stars, observation, through_a
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::place_time::{ConfirmedPlaceTime, PlaceTime, settle};
+use super::pointing::{POINTING_STARS, search_at_once};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::Solution;
@@ -16,7 +17,7 @@ use super::star_field::star_field;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectConfig, DetectError, Detections, Trail};
+use crate::detect::{self, DetectConfig, DetectError, Detections, Trail, detect_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
@@ -200,7 +201,7 @@ fn solve(
         context,
         workspace,
     };
-    let Some(mut stars) = stage.run(&config, &mut clock)? else {
+    let Some(mut stars) = stage.find(&config, &mut clock)? else {
         let timing = clock.timing();
         return Ok(not_in_time(raw, calibration, &priors, context, timing));
     };
@@ -296,6 +297,16 @@ struct StarSearch<'a, 'c> {
     workspace: &'a mut Workspace,
 }
 
+/// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched with it.
+type Search = fn(
+    &Frame,
+    &Detections,
+    (&Priors, StarPlaces),
+    &Context,
+    &mut Workspace,
+    &mut Stopwatch,
+) -> (Outcome, Option<ScalePrior>);
+
 /// The stars of a frame, and which they are.
 struct FoundStars {
     detections: Detections,
@@ -347,9 +358,71 @@ impl StarSearch<'_, '_> {
         config: &DetectConfig,
         clock: &mut Stopwatch,
     ) -> Result<Option<FoundStars>, DetectError> {
-        let Some((mut detections, mut mosaic)) = self.detect(config, clock)? else {
+        let Some((detections, mosaic)) = self.detect(config, clock)? else {
             return Ok(None);
         };
+        let mut stars = self.identify(detections, mosaic, identify_stars, clock);
+        let held = self.context.fixed_camera.as_ref();
+        if stars.outcome.identification().is_none()
+            && let Some(spot_sigma_px) = held.and_then(|held| held.spot_sigma_px)
+        {
+            // Behind clouds, what was measured as the size of stars may be that of clouds.
+            let config = DetectConfig {
+                spot_sigma_px: config.spot_sigma_px.or(Some(spot_sigma_px)),
+                ..config.clone()
+            };
+            if let Some(again) = self.detect(&config, clock)? {
+                (stars.detections, stars.mosaic) = again;
+            }
+        }
+        Ok(Some(stars))
+    }
+
+    /// The stars that are wanted: of the pointing alone, the brightest, if these show it; `None` if detection was
+    /// not done in time.
+    fn find(
+        &mut self,
+        config: &DetectConfig,
+        clock: &mut Stopwatch,
+    ) -> Result<Option<FoundStars>, DetectError> {
+        if self.context.attitude_only && !self.context.find_trails {
+            let pointed = self.point(config, clock)?;
+            if pointed.is_some() {
+                return Ok(pointed);
+            }
+        }
+        self.run(config, clock)
+    }
+
+    /// The brightest stars, where they show beyond doubt where the camera points.
+    fn point(
+        &mut self,
+        config: &DetectConfig,
+        clock: &mut Stopwatch,
+    ) -> Result<Option<FoundStars>, DetectError> {
+        let mut detections = Detections::default();
+        let frame = self.prepared.frame();
+        let detector = &mut self.workspace.detect;
+        let detected =
+            detect_brightest_into(frame, config, POINTING_STARS, detector, &mut detections);
+        clock.lap(Stage::Detect);
+        if matches!(detected, Err(DetectError::Interrupted(_))) {
+            return Ok(None);
+        }
+        detected?;
+        let stars = self.identify(detections, None, search_at_once, clock);
+        let is_found = stars.outcome.identification().is_some();
+        Ok(is_found.then_some(stars))
+    }
+
+    /// Identifies stars with `search`, as far as what is known of the frame holds.
+    fn identify(
+        &mut self,
+        detections: Detections,
+        mosaic: Option<RawColor>,
+        search: Search,
+        clock: &mut Stopwatch,
+    ) -> FoundStars {
         let frame = self.prepared.frame();
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
@@ -360,7 +433,7 @@ impl StarSearch<'_, '_> {
             for priors in near.iter().chain([priors]) {
                 let known = (priors, places);
                 let (found, dropped) =
-                    identify_stars(frame, &detections, known, context, self.workspace, clock);
+                    search(frame, &detections, known, context, self.workspace, clock);
                 dropped_scale = dropped;
                 let is_identified = found.identification().is_some();
                 outcome = Some(found);
@@ -384,22 +457,7 @@ impl StarSearch<'_, '_> {
         } = settle(answer, known, sky, |places| {
             through_air_or_not(places, &mut identify)
         });
-        if outcome.identification().is_none()
-            && let Some(spot_sigma_px) = context
-                .fixed_camera
-                .as_ref()
-                .and_then(|held| held.spot_sigma_px)
-        {
-            // Behind clouds, what was measured as the size of stars may be that of clouds.
-            let config = DetectConfig {
-                spot_sigma_px: config.spot_sigma_px.or(Some(spot_sigma_px)),
-                ..config.clone()
-            };
-            if let Some(again) = self.detect(&config, clock)? {
-                (detections, mosaic) = again;
-            }
-        }
-        Ok(Some(FoundStars {
+        FoundStars {
             detections,
             mosaic,
             outcome,
@@ -407,7 +465,7 @@ impl StarSearch<'_, '_> {
             places,
             priors,
             place_time,
-        }))
+        }
     }
 }
 

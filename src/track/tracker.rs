@@ -289,9 +289,10 @@ impl<'a> Tracker<'a> {
         Ok(known.track(Mode::Tracked, attitude, agreeing, log10))
     }
 
-    /// The full solution of a frame.
+    /// The pointing of a frame, with nothing known of the frames before but their scale.
     fn solve(&mut self, frame: &Frame, clock: Clock, loss: Loss) -> Result<Track, DetectError> {
         let mut context = self.context.clone();
+        context.attitude_only = true;
         // The known scale is tried first, and dropped where nothing matches with it.
         if let Some(known) = self.known.as_ref().filter(|_| loss != Loss::OtherSize) {
             let is_free = |scale: &ScalePrior| !scale.is_binding();

@@ -5,6 +5,7 @@
 
 mod detect;
 mod identify;
+mod pointing;
 mod reading;
 #[expect(dead_code, reason = "other tests use the rest of it")]
 #[path = "../it/common/sequence.rs"]

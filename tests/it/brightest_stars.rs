@@ -1,8 +1,9 @@
-//! The brightest stars alone: `--attitude-only`, the pointing, its errors and the optics from them, and
+//! The brightest stars alone: `--only pointing`, the pointing, its errors and the optics from them, and
 //! `--max-stars`, their measurement.
 
 use crate::common::{Ran, fixture, number, report, shared_dir, starpipe};
 use serde_json::Value;
+use std::collections::HashSet;
 
 fn named(report: &Value) -> Vec<&Value> {
     let stars = report["stars"].as_array().unwrap().iter();
@@ -21,7 +22,7 @@ fn the_attitude_is_that_of_all_stars_within_its_errors() {
     // Errors of both, as if they were independent: they are not, so this is generous.
     const SIGMAS: f64 = 4.0;
     for name in ["orion/orion.png", "cygnus/cygnus.tif"] {
-        let (all, bright) = (report(name, &[]), report(name, &["--attitude-only"]));
+        let (all, bright) = (report(name, &[]), report(name, &["--only", "pointing"]));
         let [a, b] = [&all, &bright].map(boresight);
         let apart_rad = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
         let sigma = |axis: &str| {
@@ -46,20 +47,19 @@ fn the_attitude_is_that_of_all_stars_within_its_errors() {
 fn only_the_brightest_stars_are_named_and_no_magnitude_is_measured() {
     let (all, bright) = (
         report("cygnus/cygnus.tif", &[]),
-        report("cygnus/cygnus.tif", &["--attitude-only"]),
+        report("cygnus/cygnus.tif", &["--only", "pointing"]),
     );
     assert!(named(&bright).len() < named(&all).len());
     assert!(named(&bright).len() >= 4);
-    for (star, same) in bright["stars"]
-        .as_array()
-        .unwrap()
+    let names: HashSet<&str> = named(&all)
         .iter()
-        .zip(all["stars"].as_array().unwrap())
-    {
-        if star["id"].is_string() {
-            assert_eq!(star["id"], same["id"]);
-            assert!(star["p_chance"].as_f64().unwrap() <= 1.0 / 101.0, "{star}");
-        }
+        .filter_map(|s| s["id"].as_str())
+        .collect();
+    for star in named(&bright) {
+        assert!(names.contains(star["id"].as_str().unwrap()), "{star}");
+        assert!(star["p_chance"].as_f64().unwrap() <= 1.0 / 101.0, "{star}");
+    }
+    for star in bright["stars"].as_array().unwrap() {
         assert!(star["ra_deg"].is_f64());
     }
     for absent in ["photometry", "magnitude", "prediction"] {
@@ -71,7 +71,7 @@ fn only_the_brightest_stars_are_named_and_no_magnitude_is_measured() {
 
 #[test]
 fn pointing_and_naming_are_parts_of_the_time_of_identification() {
-    for options in [&[][..], &["--attitude-only"]] {
+    for options in [&[][..], &["--only", "pointing"]] {
         let report = report("orion/orion.png", options);
         let [all, pointing, naming] = ["identify", "pointing", "naming"]
             .map(|stage| number(&report, &format!("/timing_ms/{stage}")));
@@ -98,7 +98,7 @@ fn lists_of_centroids_have_the_mode_too() {
         command.arg("-").write_stdin(table.stdout.clone());
         Ran::new(&mut command).reports().remove(0)
     };
-    let (all, bright) = (run(&[]), run(&["--attitude-only"]));
+    let (all, bright) = (run(&[]), run(&["--only", "pointing"]));
     assert_eq!(bright["status"], "identified");
     assert!(named(&bright).len() <= named(&all).len());
     let [a, b] = [&all, &bright].map(|report| number(report, "/attitude/dec_deg"));
@@ -167,4 +167,20 @@ fn too_few_wanted_stars_are_refused() {
     let ran = Ran::new(command.arg(fixture("orion/orion.png")));
     assert_eq!(ran.status, 2);
     assert!(ran.stderr.contains("--max-stars"), "{}", ran.stderr);
+}
+
+#[test]
+fn what_alone_is_wanted_is_the_pointing_or_refused() {
+    let without_times = |options: &[&str]| {
+        let mut report = report("cygnus/cygnus.tif", options);
+        report["timing_ms"] = Value::Null;
+        report
+    };
+    let asked = without_times(&["--only", "pointing"]);
+    assert_eq!(asked, without_times(&["--attitude-only"]));
+    let mut command = starpipe();
+    command
+        .args(["process", "--only", "names"])
+        .arg(fixture("cygnus/cygnus.tif"));
+    command.assert().code(2);
 }

@@ -20,6 +20,8 @@ const PREVIEW_PX: usize = 1000;
 pub struct Solver {
     indexed: IndexedCatalog<'static>,
     is_built: bool,
+    /// Whether its answers are provisional.
+    is_provisional: bool,
     workspace: Workspace,
 }
 
@@ -39,15 +41,18 @@ impl Solver {
         Ok(Self {
             indexed: kept.unwrap_or_else(build),
             is_built,
+            is_provisional: false,
             workspace: Workspace::new(),
         })
     }
 
-    /// The stars to V = 6.5 with their index, which is built in a fraction of a second.
+    /// The stars to V = 6.5 with their index, which is built in a fraction of a second: for a provisional
+    /// answer, of the pointing alone.
     pub fn of_bright_stars() -> Self {
         Self {
             indexed: IndexedCatalog::build(catalogs::bright(), &|_| ()),
             is_built: true,
+            is_provisional: true,
             workspace: Workspace::new(),
         }
     }
@@ -73,6 +78,7 @@ impl Solver {
         let camera = equipment.camera.clone();
         let mut context = Context::new(&self.indexed).with_options(&options, camera);
         context.measure_known_sky = true;
+        context.attitude_only = self.is_provisional;
         context.calibration = equipment.calibration.as_ref();
         context.on_stage = Some(&on_stage);
         let path = Path::new(name);

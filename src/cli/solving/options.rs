@@ -36,10 +36,22 @@ struct IdentificationOptions {
     /// How much is tried where the brightest stars do not identify a frame at once
     #[arg(long, value_enum, default_value_t)]
     effort: Effort,
-    /// Determine attitude and optics only, from the brightest stars: no further names, no zero point
-    /// and no limiting magnitude
-    #[arg(long)]
+    /// Determine only this. pointing: attitude and optics, from the brightest stars, several times faster; no
+    /// further names, no zero point and no limiting magnitude
+    #[arg(long, value_enum, value_name = "WHAT")]
+    only: Option<Only>,
+    /// The same as --only pointing.
+    #[arg(long, hide = true, conflicts_with = "only")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     attitude_only: bool,
+}
+
+/// What alone is wanted.
+#[derive(Debug, Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+enum Only {
+    /// Attitude and optics, from the brightest stars
+    Pointing,
 }
 
 /// The forms of reports.

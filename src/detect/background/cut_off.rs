@@ -242,7 +242,7 @@ mod tests {
     fn the_gaussian_beneath_is_found_from_a_few_to_most_pixels_cut_off() {
         const SIDE: usize = 64;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let grid = CellGrid::new(Size::new(SIDE, SIDE), SIDE);
+        let grid = CellGrid::new(Size::new(SIDE, SIDE), SIDE, 4);
         for background in [6.0f32, 3.0, 0.0, -3.0, -4.5] {
             let pixels: Vec<f32> = (0..SIDE * SIDE)
                 .map(|_| {

@@ -30,6 +30,8 @@ pub(crate) struct FrameBackground {
     pub is_coarse: bool,
     /// Where the noise is cut off at the lowest value.
     pub cut_off: CutOff,
+    /// Pixels that were sampled since this was set to 0.
+    pub visited_px: usize,
     /// The lowest sampled pixel of each row of cells, in ADU.
     lowest_adu: Vec<f32>,
     /// One for each thread.
@@ -62,8 +64,27 @@ impl FrameBackground {
         cell_px: usize,
     ) -> Result<(), Interrupted> {
         let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu, &mut self.row));
-        self.mesh.prepare(view.size(), &config);
+        self.measure_with(view, &config)
+    }
+
+    /// The same from a quarter of the pixels.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn measure_sparsely(
+        &mut self,
+        view: &View<'_>,
+        step_adu: f32,
+        cell_px: usize,
+    ) -> Result<(), Interrupted> {
+        let config = MeshConfig::of_pixels(cell_px, sigma_floor(view, step_adu, &mut self.row));
+        self.measure_with(view, &config.sparse())
+    }
+
+    fn measure_with(&mut self, view: &View<'_>, config: &MeshConfig) -> Result<(), Interrupted> {
+        self.mesh.prepare(view.size(), config);
         let grid = self.mesh.grid;
+        self.visited_px += view.height.div_ceil(grid.row_stride) * view.width;
         self.lowest_adu.resize(grid.rows, 0.0);
         let mut no_maxima = BlockMaxima::default();
         let cell_rows = CellRows::new(&mut self.mesh, &mut no_maxima, &mut self.lowest_adu);
@@ -72,11 +93,11 @@ impl FrameBackground {
                 return;
             }
             let BackgroundWorker { measurer, sampled } = worker;
-            let rows = view.sampled(cells.rows, grid.row_stride(), sampled);
+            let rows = view.sampled(cells.rows, grid.row_stride, sampled);
             // This also brings the rows from memory in one go, and not cell by cell.
             let minimum = |m, y| lowest_in_row(m, rows.row(y));
             *cells.output = (0..rows.height).fold(f32::INFINITY, minimum);
-            measurer.measure_row(&grid, rows, &config, cells.background, cells.sigma);
+            measurer.measure_row(&grid, rows, config, cells.background, cells.sigma);
         });
         view.check()?;
         let coarse_adu = COARSE * self.mesh.sigma_floor;

@@ -3,8 +3,6 @@
 use crate::base::size::Size;
 use std::ops::Range;
 
-/// Row sampling stride in large cells.
-const ROW_STRIDE: usize = 4;
 /// Cells with fewer pixels than this are sampled in full.
 const SMALL_CELL_PX: usize = 1024;
 
@@ -19,17 +17,23 @@ pub(crate) struct CellGrid {
     pub width_px: usize,
     /// Pixels down.
     pub height_px: usize,
+    /// Every this many rows of pixels are measured.
+    pub row_stride: usize,
 }
 
 impl CellGrid {
-    /// Cells of about `cell_px` pixels a side in a frame of this size.
-    pub fn new(size: Size, cell_px: usize) -> Self {
+    /// Cells of about `cell_px` pixels a side in a frame of this size. Of large ones every `row_stride` rows of
+    /// pixels are measured, of small ones all.
+    pub fn new(size: Size, cell_px: usize, row_stride: usize) -> Self {
         let cells = |side: usize| ((side as f32 / cell_px as f32).round() as usize).max(1);
+        let (columns, rows) = (cells(size.width), cells(size.height));
+        let is_large = (size.width / columns) * (size.height / rows) >= SMALL_CELL_PX;
         Self {
-            columns: cells(size.width),
-            rows: cells(size.height),
+            columns,
+            rows,
             width_px: size.width,
             height_px: size.height,
+            row_stride: if is_large { row_stride } else { 1 },
         }
     }
 
@@ -50,15 +54,5 @@ impl CellGrid {
             y * self.rows / self.height_px,
         );
         row * self.columns + column
-    }
-
-    /// Row sampling stride: every this many rows of pixels are measured.
-    pub fn row_stride(&self) -> usize {
-        let cell_px = (self.width_px / self.columns) * (self.height_px / self.rows);
-        if cell_px >= SMALL_CELL_PX {
-            ROW_STRIDE
-        } else {
-            1
-        }
     }
 }

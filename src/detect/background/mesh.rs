@@ -129,7 +129,7 @@ impl Mesh {
         let sigmas = self.sigma.chunks_mut(grid.columns);
         for (row, output) in backgrounds.zip(sigmas).enumerate() {
             let (background, sigma) = output;
-            let pixels = view.sampled(grid.rows_of(row), grid.row_stride(), &mut sampled);
+            let pixels = view.sampled(grid.rows_of(row), grid.row_stride, &mut sampled);
             measurer.measure_row(&grid, pixels, config, background, sigma);
         }
         self.finish();
@@ -137,7 +137,7 @@ impl Mesh {
 
     /// Makes room for the cells of a frame of this size.
     pub fn prepare(&mut self, size: Size, config: &MeshConfig) {
-        let grid = CellGrid::new(size, config.cell_px);
+        let grid = CellGrid::new(size, config.cell_px, config.row_stride);
         self.grid = grid;
         self.cell_width_px = grid.width_px as f32 / grid.columns as f32;
         self.columns_per_px = grid.columns as f32 / grid.width_px as f32;

@@ -19,7 +19,14 @@ pub(crate) struct MeshConfig {
     pub sampled: Sampled,
     /// Least noise of a cell.
     pub sigma_floor: f32,
+    /// Of large cells, every this many rows of pixels are sampled.
+    pub row_stride: usize,
 }
+
+/// Rows from one that is sampled to the next.
+const ROW_STRIDE: usize = 4;
+/// The same where a rough background will do: that of a cell is known to a sixteenth of the noise.
+const SPARSE_ROW_STRIDE: usize = 16;
 
 impl MeshConfig {
     /// The mesh of a frame.
@@ -28,6 +35,15 @@ impl MeshConfig {
             cell_px,
             sampled: Sampled::Pixels,
             sigma_floor,
+            row_stride: ROW_STRIDE,
+        }
+    }
+
+    /// The same from a quarter of the pixels.
+    pub const fn sparse(self) -> Self {
+        Self {
+            row_stride: SPARSE_ROW_STRIDE,
+            ..self
         }
     }
 
@@ -37,6 +53,7 @@ impl MeshConfig {
             cell_px,
             sampled: Sampled::Filtered,
             sigma_floor,
+            row_stride: ROW_STRIDE,
         }
     }
 }

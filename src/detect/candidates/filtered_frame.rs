@@ -31,6 +31,8 @@ pub(crate) struct FilteredFrame {
     pub maxima: BlockMaxima,
     /// The candidates of each row of cells.
     pub candidates: Vec<Candidates>,
+    /// Pixels that were filtered since this was set to 0.
+    pub visited_px: usize,
     /// One for each thread.
     workers: Vec<FilterWorker>,
 }
@@ -82,8 +84,10 @@ impl FilteredFrame {
             mesh,
             maxima,
             candidates,
+            visited_px,
             workers,
         } = self;
+        *visited_px += view.width * view.height;
         let config = MeshConfig::of_filtered(cell_px, SIGMA_FLOOR);
         mesh.prepare(view.size(), &config);
         maxima.prepare(view.size());
@@ -103,9 +107,9 @@ impl FilteredFrame {
             let rows = row.rows;
             let filtered = with_neighbors(&rows, view.height);
             band.filter(view, background, kernel, filtered);
-            let sampled = band.sampled(rows.clone(), grid.row_stride());
+            let sampled = band.sampled(rows.clone(), grid.row_stride);
             cells.measure_row(&grid, sampled, &config, row.background, row.sigma);
-            let slopes = band.slope_pixels(&rows, grid.row_stride(), view.height);
+            let slopes = band.slope_pixels(&rows, grid.row_stride, view.height);
             measure_slopes(&grid, &slopes, kernel.slope_rho, row.sigma, row.slope_sigma);
             let cut = candidate_cut(row.background, row.sigma, gathered.threshold as f32);
             let most = gathered.most.saturating_sub(total.load(Ordering::Relaxed));
@@ -147,6 +151,7 @@ impl FilteredFrame {
             if !candidates.reach_down_to(cuts) {
                 view.check()?;
                 let rows = self.mesh.grid.rows_of(row);
+                self.visited_px += rows.len() * view.width;
                 let filtered = with_neighbors(&rows, view.height);
                 band.filter(view, background, kernel, filtered);
                 total -= candidates.len();
@@ -171,7 +176,12 @@ impl FilteredFrame {
         kernel: &Kernel,
         mut each: impl FnMut([&[f32]; 3], usize, &Mesh),
     ) -> Result<(), Interrupted> {
-        let Self { mesh, workers, .. } = self;
+        let Self {
+            mesh,
+            visited_px,
+            workers,
+            ..
+        } = self;
         let Some(FilterWorker { band, .. }) = workers.first_mut() else {
             return Ok(());
         };
@@ -179,6 +189,7 @@ impl FilteredFrame {
         for row in (0..mesh.grid.rows).step_by(stride) {
             view.check()?;
             let rows = mesh.grid.rows_of(row);
+            *visited_px += rows.len() * view.width;
             band.filter(view, background, kernel, with_neighbors(&rows, view.height));
             for y in rows.start.max(1)..rows.end.min(view.height.saturating_sub(1)) {
                 if let (Some(above), Some(here), Some(below)) =

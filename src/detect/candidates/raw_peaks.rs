@@ -1,6 +1,7 @@
 //! Bright peaks of the unfiltered frame, on which the spot size is measured before the frame is
 //! filtered. Such stars stand out in single pixels, unless they are far out of focus.
 
+use super::peak::Peak;
 use crate::base::interrupt::Interrupted;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::{
@@ -39,6 +40,20 @@ pub(crate) struct RawPeak {
 }
 
 impl RawPeak {
+    /// The peak as one of a filtered frame, the only one of its region.
+    pub fn as_peak(&self, region: usize) -> Peak {
+        Peak {
+            x: self.x,
+            y: self.y,
+            offset_px: [0.0; 2],
+            values: None,
+            snr: self.snr,
+            prominence: self.snr,
+            region,
+            saturated: self.saturated,
+        }
+    }
+
     /// The spot size from the peak's curvature, in pixels.
     pub fn size_in(&self, view: &View<'_>) -> f64 {
         // A Gaussian of variance σ² + 1/12 falls to exp(−1/2S²) at the next pixel.
@@ -58,6 +73,8 @@ impl RawPeak {
 pub(crate) struct RawPeakFinder {
     /// The peaks found last, highest signal-to-noise ratio first.
     pub peaks: Vec<RawPeak>,
+    /// Pixels that were looked at since this was set to 0.
+    pub visited_px: usize,
     /// One for each thread.
     workers: Vec<BandWorker>,
 }
@@ -86,7 +103,11 @@ impl RawPeakFinder {
         background: &Mesh,
         saturation_adu: f32,
     ) -> Result<(), Interrupted> {
-        let Self { peaks, workers } = self;
+        let Self {
+            peaks,
+            visited_px,
+            workers,
+        } = self;
         peaks.clear();
         let bands = view.height.div_ceil(BAND_PX);
         let rounds = (view.width * view.height / ROUND_PX).max(1);
@@ -103,6 +124,7 @@ impl RawPeakFinder {
                 }
             });
             view.check()?;
+            *visited_px += view.width * view.height / rounds;
             for worker in workers.iter_mut() {
                 peaks.append(&mut worker.found);
             }

@@ -11,6 +11,7 @@ mod saturated_area;
 mod shape;
 mod star_shape;
 
+pub(crate) use core::Core;
 pub(crate) use estimate::clamp_to_frame;
 pub(crate) use measurement::{MeasureBuffers, Measurement};
 pub(crate) use ring::Ring;

@@ -83,14 +83,41 @@ pub(crate) fn star_model(
             }
         });
         buffers.batch = batch;
-        model = sums.solve();
-        let most_adu = f64::from(maps.saturation_adu) / FEWEST_ELECTRONS;
-        model.shot_adu = model.shot_adu.min(most_adu);
+        model = believable(sums.solve(), maps);
     }
     StarModel {
         spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),
         noise: model,
         is_non_gaussian: are_non_gaussian(&elongation, &model, &of_all_sizes, maps.spot_px),
+    }
+}
+
+/// The noise model from the residuals of fits with spots of one size, and a rough model of the noise, which begin at
+/// `starts`: a round of [`star_model`].
+pub(crate) fn noise_of_fits(
+    maps: &FrameMaps<'_>,
+    starts: impl Iterator<Item = BatchStart>,
+    config: &FitConfig,
+    buffers: &mut FitBuffers,
+) -> NoiseModel {
+    let mut sums = NoiseSums::default();
+    let mut batch = mem::take(&mut buffers.batch);
+    batch.fit(maps, starts, config, |_, fit, window| {
+        if let Some(fit) = fit {
+            buffers.window.copy_from(window);
+            sums.add_star(buffers, &fit, config, None);
+        }
+    });
+    buffers.batch = batch;
+    believable(sums.solve(), maps)
+}
+
+/// The noise model with no more shot noise than cameras have.
+fn believable(model: NoiseModel, maps: &FrameMaps<'_>) -> NoiseModel {
+    let most_adu = f64::from(maps.saturation_adu) / FEWEST_ELECTRONS;
+    NoiseModel {
+        shot_adu: model.shot_adu.min(most_adu),
+        ..model
     }
 }
 

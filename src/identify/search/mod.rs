@@ -22,6 +22,6 @@ pub use plan::SearchPlan;
 pub use thinning::Thinning;
 pub use tiers::Tiers;
 pub use triangle_search::{
-    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, SearchBuffers, TriangleSearch,
+    FoundHypothesis, LOG10_FALSE_ALARM_LIMIT, LOG10_SURE, SearchBuffers, TriangleSearch,
 };
 pub use windows::{SearchWindow, Windows};

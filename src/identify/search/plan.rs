@@ -15,6 +15,9 @@ pub const WORK_OF_VOTE: u64 = 3;
 /// Work of a search of the brightest stars, and of another choice of stars.
 const WORK: u64 = 850_000;
 const WORK_OF_OTHERS: u64 = 400_000;
+/// Work where an answer is wanted at once or not at all.
+const WORK_AT_ONCE: u64 = 60_000;
+const MAX_FITTED_AT_ONCE: u64 = 100;
 /// The same in each window.
 const WORK_OF_WINDOW: u64 = 60_000;
 
@@ -43,6 +46,8 @@ pub struct SearchPlan {
     /// Maximum work: the number of catalogue triangles of the right shape, and of votes, which count
     /// [`WORK_OF_VOTE`] each.
     pub max_work: u64,
+    /// Maximum number of hypotheses that are fitted.
+    pub max_fitted: u64,
 }
 
 impl SearchPlan {
@@ -62,6 +67,17 @@ impl SearchPlan {
         }
     }
 
+    /// The plan for the brightest stars of the frame where an answer is wanted at once or not at all.
+    pub const fn at_once() -> Self {
+        Self {
+            passes: &PASSES,
+            votes: &VOTES_AT_ONCE,
+            max_tested: MAX_TESTED,
+            max_work: WORK_AT_ONCE,
+            max_fitted: MAX_FITTED_AT_ONCE,
+        }
+    }
+
     /// The plan for the brightest stars of the frame, which only vote.
     pub const fn votes(effort: Effort) -> Self {
         Self {
@@ -69,6 +85,7 @@ impl SearchPlan {
             votes: &VOTES,
             max_tested: MAX_TESTED,
             max_work: effort.work(WORK),
+            max_fitted: u64::MAX,
         }
     }
 
@@ -132,6 +149,7 @@ const VOTES: [SearchPass; 7] = [
     votes_of(100, f64::INFINITY),
     votes_of(160, f64::INFINITY),
 ];
+const VOTES_AT_ONCE: [SearchPass; 2] = [votes_of(14, f64::INFINITY), votes_of(20, f64::INFINITY)];
 const TIER_VOTES: [SearchPass; 2] = [votes_of(30, 0.35), votes_of(60, 0.35)];
 
 const fn votes_of(stars: usize, largest_share: f64) -> SearchPass {

@@ -35,7 +35,7 @@ pub const LOG10_FALSE_ALARM_LIMIT: f64 = -8.0;
 /// A hypothesis below this ends the search. One between the two limits waits for the end of its
 /// pass, in case a better one comes: a few inexact stars may also agree with a neighbor of the
 /// truth.
-const LOG10_SURE: f64 = -14.0;
+pub const LOG10_SURE: f64 = -14.0;
 
 /// Number of stars, the brightest, with which a hypothesis is tested first. It ends the search where
 /// these make it sure. That adds 10⁻¹⁴ to the false-alarm probability at most, to the 10⁻⁸ of the
@@ -80,6 +80,7 @@ pub struct TriangleSearch<'a> {
     number: u32,
     hypotheses: u64,
     candidates: u64,
+    fitted: u64,
     /// Whether the interrupt was due; then it is not asked again.
     interrupted: bool,
     best_log10: Option<f64>,
@@ -136,6 +137,7 @@ impl<'a> TriangleSearch<'a> {
             number: 1,
             hypotheses: 0,
             candidates: 0,
+            fitted: 0,
             interrupted: false,
             best_log10: None,
             provisional: None,
@@ -342,6 +344,7 @@ impl<'a> TriangleSearch<'a> {
     /// Whether as much was looked up as the plan allows.
     fn is_spent(&self) -> bool {
         self.candidates + WORK_OF_VOTE * self.buffers.votes.len() as u64 > self.plan.max_work
+            || self.fitted >= self.plan.max_fitted
     }
 
     /// Lets the triangles of a pass vote whose faintest star is not one of the brightest `from`.
@@ -378,6 +381,7 @@ impl<'a> TriangleSearch<'a> {
     fn try_leading(&mut self) -> Option<FoundHypothesis> {
         let mut number = 0;
         while let Some(vote) = self.buffers.votes.leading(number)
+            && self.fitted < self.plan.max_fitted
             && !self.is_interrupted()
         {
             if let Some(found) = self.try_vote(&vote) {
@@ -417,7 +421,9 @@ impl<'a> TriangleSearch<'a> {
 
     /// Whether no more hypotheses are to be tested.
     fn is_exhausted(&self) -> bool {
-        self.hypotheses > self.plan.max_tested || self.candidates > self.plan.max_work
+        self.hypotheses > self.plan.max_tested
+            || self.candidates > self.plan.max_work
+            || self.fitted >= self.plan.max_fitted
     }
 
     fn try_triangle(&mut self, triangle: &ObservedTriangle) -> Option<FoundHypothesis> {
@@ -523,6 +529,7 @@ impl<'a> TriangleSearch<'a> {
         hypothesis: &Hypothesis,
         triangle: &ObservedTriangle,
     ) -> Option<FoundHypothesis> {
+        self.fitted += 1;
         if let Some(found) = self.tested(hypothesis, triangle, FIRST_TESTED_STARS)
             && found.log10_false_alarm <= LOG10_SURE
         {

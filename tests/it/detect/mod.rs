@@ -6,6 +6,7 @@ mod background;
 mod below_black;
 mod false_alarms;
 mod pairs;
+mod passes;
 mod saturated;
 mod soundness;
 mod trails;

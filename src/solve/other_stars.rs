@@ -1,14 +1,15 @@
-//! The stars of a frame at half and a quarter of its resolution.
+//! Other stars of a frame: the brightest in single pixels, and those at half and a quarter of its resolution.
 //!
-//! Where structure swamps the stars (city lights, foliage, nebulae, noise of compression), there is
-//! less of it in a coarser frame, and the stars stand out.
+//! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). It is wider than they are, so
+//! in single pixels they may stand out; and there is less of it in a coarser frame.
 
+use super::pointing::POINTING_STARS;
 use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
-use crate::detect::{self, DetectConfig, detect};
+use crate::detect::{self, DetectConfig, Detections, detect, detect_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
-use crate::identify::{CoarserFields, ObservedStar, StarField};
+use crate::identify::{ObservedStar, OtherFields, StarField};
 use std::cell::OnceCell;
 
 /// Sides of the blocks of pixels that are averaged, the cheapest first.
@@ -20,17 +21,20 @@ const MAX_PX: usize = 1 << 20;
 /// Most detections: a search looks at the brightest.
 const MAX_DETECTIONS: usize = 1000;
 
-/// A frame whose stars are detected at a lower resolution, when a search asks for them.
-pub(super) struct CoarseFrames<'a> {
+/// The number of choices: the brightest first, which cost least.
+const CHOICES: usize = 1 + FACTORS.len();
+
+/// A frame whose stars are detected otherwise, when a search asks for them.
+pub(super) struct OtherStars<'a> {
     frame: &'a Frame<'a>,
     /// The detection of the whole frame. Trails are searched in front of its background later, so a coarse
     /// frame is detected with buffers of its own.
     detector: &'a detect::Workspace,
     places: StarPlaces,
-    fields: [OnceCell<Option<StarField>>; FACTORS.len()],
+    fields: [OnceCell<Option<StarField>>; CHOICES],
 }
 
-impl<'a> CoarseFrames<'a> {
+impl<'a> OtherStars<'a> {
     pub fn new(frame: &'a Frame<'a>, detector: &'a detect::Workspace, places: StarPlaces) -> Self {
         Self {
             frame,
@@ -38,6 +42,27 @@ impl<'a> CoarseFrames<'a> {
             places,
             fields: Default::default(),
         }
+    }
+
+    /// The stars that stand out in single pixels.
+    fn brightest(&self) -> Option<StarField> {
+        let Self {
+            frame,
+            detector,
+            places,
+            ..
+        } = self;
+        let (config, mut detections) = (DetectConfig::default(), Detections::default());
+        let mut detector = detector.emptied();
+        detect_brightest_into(
+            frame,
+            &config,
+            POINTING_STARS,
+            &mut detector,
+            &mut detections,
+        )
+        .ok()?;
+        Some(star_field(frame, &detections, *places))
     }
 
     /// The stars of the frame in blocks of `factor` × `factor` pixels, in pixels of the whole frame.
@@ -79,15 +104,17 @@ impl<'a> CoarseFrames<'a> {
     }
 }
 
-impl CoarserFields for CoarseFrames<'_> {
+impl OtherFields for OtherStars<'_> {
     fn count(&self) -> usize {
-        FACTORS.len()
+        CHOICES
     }
 
     fn field(&self, number: usize) -> Option<&StarField> {
-        self.fields[number]
-            .get_or_init(|| self.detected(FACTORS[number]))
-            .as_ref()
+        let detected = || match number.checked_sub(1) {
+            Some(coarse) => self.detected(FACTORS[coarse]),
+            None => self.brightest(),
+        };
+        self.fields[number].get_or_init(detected).as_ref()
     }
 }
 
@@ -109,9 +136,9 @@ mod tests {
         let pixels = (0..300 * 320).map(|i| light(i % 320, i / 320)).collect();
         let frame = Frame::new(320, 300, pixels).unwrap();
         let detector = detect::Workspace::new();
-        let coarser = CoarseFrames::new(&frame, &detector, StarPlaces::default());
-        for number in 0..coarser.count() {
-            let field = coarser.field(number).unwrap();
+        let other_fields = OtherStars::new(&frame, &detector, StarPlaces::default());
+        for number in 1..other_fields.count() {
+            let field = other_fields.field(number).unwrap();
             assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
             for [x, y] in stars {
                 let place = PixelPoint::new(x, y);
@@ -121,8 +148,8 @@ mod tests {
         }
         let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
         assert!(
-            CoarseFrames::new(&small, &detector, StarPlaces::default())
-                .field(0)
+            OtherStars::new(&small, &detector, StarPlaces::default())
+                .field(1)
                 .is_none()
         );
     }
