@@ -1,7 +1,7 @@
-//! Other stars of a frame: the brightest in single pixels, and those at half and a quarter of its resolution.
+//! Other stars of a frame: those at half and a quarter of its resolution, and the brightest in single pixels.
 //!
-//! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). It is wider than they are, so
-//! in single pixels they may stand out; and there is less of it in a coarser frame.
+//! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). There is less of it in a
+//! coarser frame; and it is wider than they are, so that in single pixels they may stand out.
 
 use super::pointing::POINTING_STARS;
 use super::star_field::star_field;
@@ -21,8 +21,8 @@ const MAX_PX: usize = 1 << 20;
 /// Most detections: a search looks at the brightest.
 const MAX_DETECTIONS: usize = 1000;
 
-/// The number of choices: the brightest first, which cost least.
-const CHOICES: usize = 1 + FACTORS.len();
+/// The number of choices: the coarser frames, then the brightest stars.
+const CHOICES: usize = FACTORS.len() + 1;
 
 /// A frame whose stars are detected otherwise, when a search asks for them.
 pub(super) struct OtherStars<'a> {
@@ -110,8 +110,8 @@ impl OtherFields for OtherStars<'_> {
     }
 
     fn field(&self, number: usize) -> Option<&StarField> {
-        let detected = || match number.checked_sub(1) {
-            Some(coarse) => self.detected(FACTORS[coarse]),
+        let detected = || match FACTORS.get(number) {
+            Some(&factor) => self.detected(factor),
             None => self.brightest(),
         };
         self.fields[number].get_or_init(detected).as_ref()
@@ -137,7 +137,7 @@ mod tests {
         let frame = Frame::new(320, 300, pixels).unwrap();
         let detector = detect::Workspace::new();
         let other_fields = OtherStars::new(&frame, &detector, StarPlaces::default());
-        for number in 1..other_fields.count() {
+        for number in 0..FACTORS.len() {
             let field = other_fields.field(number).unwrap();
             assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
             for [x, y] in stars {
@@ -149,7 +149,7 @@ mod tests {
         let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
         assert!(
             OtherStars::new(&small, &detector, StarPlaces::default())
-                .field(1)
+                .field(0)
                 .is_none()
         );
     }
