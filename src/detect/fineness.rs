@@ -3,8 +3,9 @@
 //! Between the centres of cells the background is taken to be straight. Where it is not, as in a small picture of
 //! all the sky, what is left of it in the filtered frame raises the threshold, and finer cells show fainter stars.
 
-use super::background::FrameBackground;
-use super::search::Searched;
+use super::background::{FrameBackground, Mesh};
+use super::candidates::FoundPeaks;
+use super::search::{FrameSearch, Searched};
 
 /// Scatter of a parabola about its chord between the centres of two cells, over its second difference: 1/√720.
 const RMS_PER_BEND: f32 = 0.037_267_8;
@@ -16,60 +17,71 @@ const MAX: f32 = 0.75;
 const WORTHWHILE: f64 = 0.95;
 
 /// The side of the cells of a frame, which is found by searching it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(super) struct CellSize {
     /// The side, in pixels.
     pub px: usize,
-    /// What was searched before with coarser cells.
+    /// What was found before with coarser cells.
     coarser: Option<Tried>,
-    /// Whether finer ones have been tried, and did not help.
-    is_final: bool,
 }
 
-/// A search with cells of a size.
-#[derive(Debug, Clone, Copy)]
+/// A search with cells of a size, and what it found.
+#[derive(Debug)]
 struct Tried {
     cell_px: usize,
     /// Flux at which half of the stars are detected, in ADU.
     limit_adu: f64,
+    searched: Searched,
+    background: FrameBackground,
+    /// Of the filtered frame.
+    mesh: Mesh,
+    found: FoundPeaks,
 }
 
 impl CellSize {
     /// Cells of this side to begin with.
     pub fn new(px: usize) -> Self {
-        Self {
-            px,
-            coarser: None,
-            is_final: false,
-        }
+        Self { px, coarser: None }
     }
 
-    /// Whether the frame needs no further search after one on this `background`; else with which cells it is
-    /// to be done. `sorted` is a buffer.
-    pub fn is_settled(
+    /// The spot size for which the frame was filtered with coarser cells, in pixels.
+    pub fn filter_px(&self) -> Option<f64> {
+        self.coarser
+            .as_ref()
+            .map(|tried| tried.searched.pass.spot_px)
+    }
+
+    /// What was found in the frame, where it needs no search after the one on this `background`: that, or what
+    /// was found with coarser cells, which is put back. Else sets the cells with which the next is to be done.
+    pub fn settle(
         &mut self,
-        background: &FrameBackground,
-        searched: &Searched,
-        sorted: &mut Vec<f32>,
-    ) -> bool {
-        if self.is_final {
-            return true;
-        }
-        let pass = &searched.pass;
-        let tried = Tried {
-            cell_px: self.px,
-            limit_adu: pass.limit_adu(background.median_sigma_adu),
-        };
-        if let Some(coarser) = self.coarser
-            && tried.limit_adu > WORTHWHILE * coarser.limit_adu
-        {
+        background: &mut FrameBackground,
+        search: &mut FrameSearch,
+        searched: Searched,
+    ) -> Option<Searched> {
+        let limit_adu = searched.pass.limit_adu(background.median_sigma_adu);
+        let is_worse = |coarser: &Tried| limit_adu > WORTHWHILE * coarser.limit_adu;
+        if let Some(coarser) = self.coarser.take_if(|coarser| is_worse(coarser)) {
             self.px = coarser.cell_px;
-            self.is_final = true;
-            return false;
+            *background = coarser.background;
+            search.filtered.mesh = coarser.mesh;
+            search.found.set(coarser.found);
+            return Some(coarser.searched);
         }
-        let finer_px = finer_px(self.px, background, searched, sorted);
-        self.coarser = Some(tried);
-        std::mem::replace(&mut self.px, finer_px) == finer_px
+        let finer_px = finer_px(self.px, background, &searched, &mut search.sorted);
+        if finer_px == self.px {
+            return Some(searched);
+        }
+        self.coarser = Some(Tried {
+            cell_px: self.px,
+            limit_adu,
+            searched,
+            background: background.clone(),
+            mesh: search.filtered.mesh.clone(),
+            found: search.found.found(),
+        });
+        self.px = finer_px;
+        None
     }
 }
 

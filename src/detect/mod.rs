@@ -172,20 +172,29 @@ fn run(
     *saturation_adu = config.saturation_adu(frame, saturation);
     let memory = CandidateMemory::beside(frame, *memory);
     let mut cells = CellSize::new(config.cell_px);
-    let (input, searched) = loop {
+    let saturation_adu = *saturation_adu;
+    let searched = loop {
         background.measure(&view, frame.step_adu, cells.px)?;
         let input = SearchInput {
             view: &view,
             background,
             cell_px: cells.px,
-            saturation_adu: *saturation_adu,
+            saturation_adu,
             config,
             memory,
         };
-        let searched = search.run(&input)?;
-        if cells.is_settled(background, &searched, &mut search.sorted) {
-            break (input, searched);
+        let searched = search.run(&input, cells.filter_px())?;
+        if let Some(settled) = cells.settle(background, search, searched) {
+            break settled;
         }
+    };
+    let input = SearchInput {
+        view: &view,
+        background,
+        cell_px: cells.px,
+        saturation_adu,
+        config,
+        memory,
     };
     set_levels(found, background, &searched);
     let meshes = [&background.mesh, &search.filtered.mesh];

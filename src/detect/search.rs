@@ -101,6 +101,8 @@ pub(crate) struct Searched {
 /// A pass of the filter over the frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FilterPass {
+    /// Spot size that it is for, in pixels.
+    pub spot_px: f64,
     /// Signal-to-noise ratio of a star whose flux equals the noise of a pixel: √ΣP².
     pub matched_gain: f64,
     /// The threshold, in standard deviations of the filtered noise.
@@ -126,6 +128,11 @@ enum StarEstimate {
     Settled(StarModel),
     /// A better guess of the spot size, in pixels.
     Guess(f64),
+}
+
+/// Whether a guessed spot size is near enough to another one.
+fn is_guess_of(guess_px: f64, spot_px: f64) -> bool {
+    (spot_px / guess_px).max(guess_px / spot_px) < SPOT_GUESS_TOLERANCE
 }
 
 /// Searches frames; holds the peaks found last, and the buffers.
@@ -162,17 +169,24 @@ impl FrameSearch {
         }
     }
 
-    /// Searches the frame with a filter of the size that its own stars have.
+    /// Searches the frame with a filter of the size that its own stars have. A first guess that is far from
+    /// `near_px`, if given, is not tried.
     ///
     /// # Errors
     /// [`DetectError::Interrupted`], [`DetectError::TooCrowded`].
-    pub fn run(&mut self, input: &SearchInput<'_>) -> Result<Searched, DetectError> {
+    pub fn run(
+        &mut self,
+        input: &SearchInput<'_>,
+        near_px: Option<f64>,
+    ) -> Result<Searched, DetectError> {
         let mut spot_px = match self.measure_unfiltered(input)? {
             StarEstimate::Settled(stars) => {
                 let pass = self.find_peaks(input, stars.spot_px)?;
                 return Ok(Searched { stars, pass });
             }
-            StarEstimate::Guess(spot_px) => spot_px,
+            StarEstimate::Guess(spot_px) => near_px
+                .filter(|near_px| !is_guess_of(spot_px, *near_px))
+                .unwrap_or(spot_px),
         };
         let mut rounds_left = MAX_FILTER_ROUNDS;
         loop {
@@ -232,8 +246,7 @@ impl FrameSearch {
             Some(_) => None,
         };
         let measured_px = measured.unwrap_or(spot_px);
-        let ratio = (measured_px / spot_px).max(spot_px / measured_px);
-        if ratio < SPOT_GUESS_TOLERANCE || is_last {
+        if is_guess_of(spot_px, measured_px) || is_last {
             maps.spot_px = measured_px;
             let model = star_model(&maps, stars, fits);
             StarEstimate::Settled(input.with_stated_size(model))
@@ -314,6 +327,7 @@ impl FrameSearch {
         found.run(&filtered.candidates, &filtered.mesh, view, &search_config)?;
         let sigma = median(&filtered.mesh.sigma, sorted);
         Ok(FilterPass {
+            spot_px,
             matched_gain: kernel.matched_gain(),
             threshold,
             threshold_level: threshold * sigma,

@@ -87,12 +87,13 @@ pub(crate) fn clipped(
 /// Number, sum and sum of squares of `sample - center` where it is at most `half_width` in size.
 #[inline(always)]
 fn clipped_moments(samples: &CellSamples<'_>, center: f32, half_width: f32) -> [f32; 3] {
-    let [mut count, mut sum, mut squares] = [[0.0f32; LANES]; 3];
+    let mut count = [0u32; LANES];
+    let [mut sum, mut squares] = [[0.0f32; LANES]; 2];
     let mut add = |lane: usize, value: f32| {
         let deviation = value - center;
         let inside = deviation.abs() <= half_width;
         let kept = if inside { deviation } else { 0.0 };
-        count[lane] += if inside { 1.0 } else { 0.0 };
+        count[lane] += u32::from(inside);
         sum[lane] += kept;
         squares[lane] += kept * kept;
     };
@@ -120,5 +121,9 @@ fn clipped_moments(samples: &CellSamples<'_>, center: f32, half_width: f32) -> [
             }
         }
     }
-    [count, sum, squares].map(pairwise_sum)
+    let mut total = 0;
+    for count in count {
+        total += count;
+    }
+    [total as f32, pairwise_sum(sum), pairwise_sum(squares)]
 }

@@ -17,6 +17,7 @@ use super::grid::CellGrid;
 use super::mesh::Mesh;
 use crate::base::statistics::{median, normal_quantile};
 use crate::detect::pixels::View;
+use multiversion::multiversion;
 
 /// Noise whose background is more than this many standard deviations above the lowest value is not
 /// cut off.
@@ -166,8 +167,9 @@ fn measure_cell(
     let (mut total, mut at_lowest) = (0, 0);
     for y in rows.clone() {
         let row = view.row(y).span(columns.clone()).as_floats(buffer);
-        total += row.iter().filter(|v| !v.is_nan()).count();
-        at_lowest += row.iter().filter(|&&v| v == lowest).count();
+        let [known, lowest] = count_in_row(row, lowest);
+        total += known;
+        at_lowest += lowest;
     }
     if total == 0 || (at_lowest as f64) < MIN_AT_LOWEST * total as f64 {
         return None;
@@ -198,6 +200,17 @@ fn measure_cell(
         return (above.len() < MIN_ABOVE).then_some(CutCell::Dark);
     }
     gaussian_beneath(lowest, at_lowest, total, above)
+}
+
+/// How many pixels of a row have a value, and how many the lowest.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn count_in_row(row: &[f32], lowest: f32) -> [usize; 2] {
+    let [mut known, mut at_lowest] = [0u32; 2];
+    for value in row {
+        known += u32::from(!value.is_nan());
+        at_lowest += u32::from(*value == lowest);
+    }
+    [known, at_lowest].map(|count| count as usize)
 }
 
 /// The Gaussian of which `at_lowest` of `total` pixels are cut off; the others are `above`.

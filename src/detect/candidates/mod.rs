@@ -19,5 +19,5 @@ pub(crate) use memory::CandidateMemory;
 pub(crate) use peak::Peak;
 pub(crate) use raw_peaks::{RawPeak, RawPeakFinder};
 pub(crate) use region::Region;
-pub(crate) use search::PeakSearch;
+pub(crate) use search::{FoundPeaks, PeakSearch};
 pub(crate) use search_config::SearchConfig;

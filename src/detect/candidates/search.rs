@@ -43,7 +43,31 @@ pub(crate) struct PeakSearch {
     pub regions: Vec<Region>,
 }
 
+/// What a search found.
+#[derive(Debug, Clone)]
+pub(crate) struct FoundPeaks {
+    peaks: Vec<Peak>,
+    regions: Vec<Region>,
+    is_full: bool,
+}
+
 impl PeakSearch {
+    /// What was found last.
+    pub fn found(&self) -> FoundPeaks {
+        FoundPeaks {
+            peaks: self.peaks.clone(),
+            regions: self.regions.clone(),
+            is_full: self.selection.is_full,
+        }
+    }
+
+    /// Puts back what was found before.
+    pub fn set(&mut self, found: FoundPeaks) {
+        self.peaks = found.peaks;
+        self.regions = found.regions;
+        self.selection.is_full = found.is_full;
+    }
+
     /// Finds regions and peaks in the candidates of all rows of cells of the filtered frame, whose
     /// mean and noise are in `mesh`.
     ///

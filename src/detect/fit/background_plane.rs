@@ -1,11 +1,10 @@
 //! The background in the window of a fit.
 
-use super::edge::{Edge, RING_PX, Ring, RingPixel};
+use super::edge::Edge;
+use super::ring::Ring;
 use super::window::Window;
-use crate::base::least_squares::LinearFit;
 use crate::detect::background::Mesh;
 use crate::detect::pixels::View;
-use nalgebra::SVector;
 
 /// A plane, and what is not in it.
 #[derive(Debug, Clone, Copy)]
@@ -70,10 +69,11 @@ impl BackgroundPlane {
     /// That through the pixels in a ring around the window, without stars, on this side of an edge. `None`
     /// where they are too few.
     fn through_ring(view: &View<'_>, window: &Window, noise_adu: f64) -> Option<Self> {
-        let mut ring = ring_around(view, window);
+        let mut ring = Ring::default();
+        ring.gather(view, window);
         let edge = Edge::in_ring(&ring, noise_adu);
         if let Some(edge) = edge {
-            ring.retain(|pixel| !edge.hides(pixel.from_middle.map(f64::from)));
+            ring.retain(|place| !edge.hides(place.map(f64::from)));
         }
         let ([level, across, down, bend @ ..], variance) = match edge {
             Some(_) => surface_through(&ring)?,
@@ -91,85 +91,23 @@ impl BackgroundPlane {
     }
 }
 
-/// The pixels around a window.
-fn ring_around(view: &View<'_>, window: &Window) -> Ring {
-    let around = |first: usize, count: usize, side: usize| {
-        first.saturating_sub(RING_PX)..(first + count + RING_PX).min(side)
-    };
-    let columns = around(window.x0, window.width, view.width);
-    let rows = around(window.y0, window.height, view.height);
-    let is_inside = |x: usize, y: usize| {
-        (window.x0..window.x0 + window.width).contains(&x)
-            && (window.y0..window.y0 + window.height).contains(&y)
-    };
-    let [middle_x, middle_y] = window.middle();
-    let pixel = |x: usize, y: usize| RingPixel {
-        from_middle: [
-            (x as f64 - window.x0 as f64 - middle_x) as f32,
-            (y as f64 - window.y0 as f64 - middle_y) as f32,
-        ],
-        value: view.at(x, y),
-    };
-    let all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-    let around = all.filter(|&(x, y)| !is_inside(x, y));
-    let pixels = around.map(|(x, y)| pixel(x, y));
-    pixels.filter(|pixel| pixel.value.is_finite()).collect()
-}
-
 /// The plane through pixels without stars: its value in the middle of the window, its increase from column to
 /// column and from row to row, and three zeros; and their variance about it. `None` where they are too few.
-fn plane_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
-    let (plane, variance) = fitted_surface::<3>(ring)?;
+fn plane_through(ring: &Ring) -> Option<([f64; 6], f64)> {
+    let (plane, variance) = ring.surface::<3>()?;
     Some(([plane[0], plane[1], plane[2], 0.0, 0.0, 0.0], variance))
 }
 
 /// The same, with the coefficients of x², xy and y² where a plane is not enough.
-fn surface_through(ring: &[RingPixel]) -> Option<([f64; 6], f64)> {
+fn surface_through(ring: &Ring) -> Option<([f64; 6], f64)> {
     /// The gain in χ² over a plane that they need.
     const MIN_GAIN: f64 = 25.0;
     let plane = plane_through(ring)?;
-    let bent = fitted_surface::<6>(ring)
-        .filter(|(_, variance)| ring.len() as f64 * (plane.1 / variance - 1.0) > MIN_GAIN);
+    let count = ring.values().len() as f64;
+    let bent = ring
+        .surface::<6>()
+        .filter(|(_, variance)| count * (plane.1 / variance - 1.0) > MIN_GAIN);
     Some(bent.map_or(plane, |(surface, variance)| (surface.into(), variance)))
-}
-
-/// The surface of the first `N` terms through pixels without stars, and their variance about it.
-fn fitted_surface<const N: usize>(ring: &[RingPixel]) -> Option<(SVector<f64, N>, f64)> {
-    /// Rounds of clipping: the first surfaces are of the stars, too.
-    const ROUNDS: usize = 6;
-    /// Pixels so many standard deviations off the surface of the round before are not its own.
-    const CLIP_SIGMAS: f64 = 2.5;
-    /// Share of the pixels that is left at least.
-    const MIN_FRACTION: f64 = 0.4;
-    let first = f64::from(ring.first()?.value);
-    let mut found: Option<(SVector<f64, N>, f64)> = None;
-    for _ in 0..ROUNDS {
-        let (mut fit, mut used, mut squares) = (LinearFit::new(), 0.0, 0.0);
-        for pixel in ring {
-            let [x, y] = pixel.from_middle.map(f64::from);
-            let all = [1.0, x, y, x * x, x * y, y * y];
-            let terms = SVector::<f64, N>::from_column_slice(&all[..N]);
-            let value = f64::from(pixel.value) - first;
-            let is_off = |(surface, variance): (SVector<f64, N>, f64)| {
-                (value - surface.dot(&terms)).powi(2) > CLIP_SIGMAS * CLIP_SIGMAS * variance
-            };
-            if found.is_some_and(is_off) {
-                continue;
-            }
-            fit.add(&terms, 1.0, value);
-            squares += value * value;
-            used += 1.0;
-        }
-        if used < (MIN_FRACTION * ring.len() as f64).max(N as f64 + 1.0) {
-            return None;
-        }
-        let surface = fit.solve()?;
-        let variance = (squares - surface.dot(&fit.vector)) / (used - N as f64);
-        found = Some((surface, variance.max(0.0)));
-    }
-    let (mut surface, variance) = found?;
-    surface[0] += first;
-    Some((surface, variance))
 }
 
 #[cfg(test)]

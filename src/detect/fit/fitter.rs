@@ -1,6 +1,6 @@
 //! Fits spots to the pixels of a window.
 
-use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish};
+use super::gauss_newton::{MAX_STEPS, StepOutcome, add_background_map, advance, finish, is_rough};
 use super::light::{GaussianLight, add_light};
 use super::mixture_light::{MixtureImage, MixtureLight};
 use super::normal::{CholeskyFactor, NormalEquations};
@@ -85,7 +85,11 @@ impl Fitter {
             ..SpotFit::default()
         };
         for step in 0..MAX_STEPS {
-            let mut normal: NormalEquations<N> = self.linearise(window, &fit, config);
+            let mut normal: NormalEquations<N> = if is_rough(step, start.len(), config) {
+                self.linearise_place(window, &fit, config)
+            } else {
+                self.linearise(window, &fit, config)
+            };
             match advance(&mut fit, start, &mut normal, step, config) {
                 StepOutcome::Continue if step + 1 < PATIENCE => {}
                 StepOutcome::Continue if fit.chi2 > MISSED * most_chi2 => return fit,
@@ -342,12 +346,33 @@ impl Fitter {
         fit: &SpotFit,
         config: &FitConfig,
     ) -> NormalEquations<N> {
-        let mut normal = NormalEquations::empty();
-        match fit.spots.len() {
-            1 => self.draw::<LIGHT_BY_ALL>(window, &fit.spots, fit.spot_px),
-            // The size of several spots is neither fitted nor tested.
-            _ => self.draw::<LIGHT_BY_PLACE>(window, &fit.spots, fit.spot_px),
+        // The size of several spots is neither fitted nor tested.
+        if fit.spots.len() != 1 {
+            return self.linearise_place(window, fit, config);
         }
+        self.draw::<LIGHT_BY_ALL>(window, &fit.spots, fit.spot_px);
+        self.equations_of_drawn(window, fit, config)
+    }
+
+    /// The same without the derivatives by the size.
+    fn linearise_place<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &SpotFit,
+        config: &FitConfig,
+    ) -> NormalEquations<N> {
+        self.draw::<LIGHT_BY_PLACE>(window, &fit.spots, fit.spot_px);
+        self.equations_of_drawn(window, fit, config)
+    }
+
+    /// The normal equations of spots that were drawn.
+    fn equations_of_drawn<const N: usize>(
+        &mut self,
+        window: &Window,
+        fit: &SpotFit,
+        config: &FitConfig,
+    ) -> NormalEquations<N> {
+        let mut normal = NormalEquations::empty();
         let pixels = WindowPixels::new(window, fit.background, &config.noise);
         let spots = fit.spots.iter().enumerate();
         let mut sums = std::mem::take(&mut self.sums);

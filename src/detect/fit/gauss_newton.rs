@@ -65,6 +65,12 @@ pub(super) fn add_background_map<const N: usize>(
     normal.chi2 += weight * fit.background * fit.background;
 }
 
+/// Whether a step of so many spots needs no derivatives by the size: the first is hardly ever the last, so that
+/// the size's excess is not needed.
+pub(super) fn is_rough(step: usize, spots: usize, config: &FitConfig) -> bool {
+    step == 0 && spots == 1 && !config.free_size
+}
+
 /// Solves the equations at `fit` and takes step number `step`; completes the fit if it converged.
 pub(super) fn advance<const N: usize>(
     fit: &mut SpotFit,
@@ -74,8 +80,7 @@ pub(super) fn advance<const N: usize>(
     config: &FitConfig,
 ) -> StepOutcome {
     let fitted = config.parameter_count(start.len());
-    // The first step is hardly ever the last: it does not need the size's excess.
-    let is_rough = step == 0 && start.len() == 1 && !config.free_size;
+    let is_rough = is_rough(step, start.len(), config);
     let tests_size = start.len() == 1 && !is_rough;
     let all = fitted.max(if tests_size { ONE_SPOT } else { 0 });
     let information = (0..start.len()).flat_map(|i| [3 * i, 3 * i + 1]);

@@ -23,6 +23,7 @@ mod light;
 mod mixture_light;
 mod normal;
 mod parameters;
+mod ring;
 mod sums;
 mod window;
 

@@ -212,13 +212,13 @@ impl Measurement<'_> {
             fit = self.add_companion(pair, surroundings, buffers, out);
         }
         let mut detection = detection_of(&self.maps, &self.noise, &fit, peak, region);
+        let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
+        detection.flags.extended = may_be_edge && self.ring.is_bright(&self.maps, peak);
         if is_star {
             shape::flag_size(&self.maps, &self.shape, peak, &fit, &mut detection, buffers);
         }
         detection.flags.hot_pixel |= self.is_too_sharp(peak);
         detection.flags.blended = fit.spots.len() > 1;
-        let may_be_edge = fit.spots.len() == 1 && !peak.saturated;
-        detection.flags.extended |= may_be_edge && self.ring.is_bright(&self.maps, peak);
         self.flag_trail(peak, region, &mut detection);
         if self.is_misfitted() && fit.spots.len() == 1 {
             self.center_elongated(&fit, peak, &mut detection, buffers);

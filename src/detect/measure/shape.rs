@@ -57,8 +57,8 @@ pub(crate) fn sharpest_px(maps: &FrameMaps<'_>, shape: &StarShape) -> f64 {
     }
 }
 
-/// Sets the flags of sources sharper or wider than the frame's spot; the window of the fit is in
-/// `buffers`.
+/// Sets the flags of sources sharper or wider than the frame's spot, unless they have the latter; the
+/// window of the fit is in `buffers`.
 pub(super) fn flag_size(
     maps: &FrameMaps<'_>,
     shape: &StarShape,
@@ -71,6 +71,7 @@ pub(super) fn flag_size(
     if excess < -StarSize::TESTED_SIGMA {
         detection.flags.hot_pixel = is_hot_pixel(maps, peak, fit, buffers);
     } else if !detection.flags.border
+        && !detection.flags.extended
         && excess > StarSize::SIGNIFICANT_SIGMA
         && fit.size_excess_px > 0.3 * (StarSize::MAX - 1.0) * maps.spot_px
     {

@@ -302,7 +302,9 @@ impl CumulativeProfile {
     pub fn fill(&mut self, first_px: f64, step_px: f64, sigma_px: f64, count: usize) {
         let scale = Cumulative::of_spot(sigma_px).scale;
         let groups = count.div_ceil(GROUP_PX);
-        self.values.resize(groups, [0.0; GROUP_PX]);
+        if self.values.len() < groups {
+            self.values.resize(groups, [0.0; GROUP_PX]);
+        }
         let [first, step] = [first_px, step_px].map(|px| (px * scale) as f32);
         fill_cumulative(first, step, &mut self.values[..groups]);
     }

@@ -15,8 +15,8 @@
 use super::gaussian::{
     CumulativeProfile, GROUP_PX, GaussianComponent, PIXEL_VARIANCE_PX2, PixelGroup,
 };
-use super::lanes::each_of;
-use super::taps::{AxisTaps, PixelTaps, TAPS, TableLayout, fill_axes};
+use super::lanes::{each_of, plus, times};
+use super::taps::{AxisTaps, PixelTaps, TAPS, TableLayout, TapWeights, fill_axes};
 use crate::base::size::Size;
 use multiversion::multiversion;
 
@@ -98,20 +98,20 @@ impl PsfTable {
     /// Tabulates components.
     pub(super) fn fill(&mut self, components: &[GaussianComponent], layout: TableLayout) {
         self.layout = layout;
-        self.coefficients.clear();
-        self.coefficients.resize(layout.len(), 0.0);
+        // Summed in the order of their places, in which a component has them all together.
+        let stride = (layout.samples() + GROUP_PX).next_multiple_of(GROUP_PX);
+        let mut samples = vec![0.0; layout.samples() * stride];
         let mut profiles = [SplineProfile::default(), SplineProfile::default()];
         for component in components {
             for (profile, offset_px) in profiles.iter_mut().zip(component.offset_px) {
                 profile.fill(layout, offset_px, component.sigma_px);
             }
-            add_component_samples(
-                layout,
-                &profiles,
-                component.share as f32,
-                &mut self.coefficients,
-            );
+            let share = component.share as f32;
+            add_component_samples(stride, &profiles, share, &mut samples);
         }
+        self.coefficients.clear();
+        self.coefficients.resize(layout.len(), 0.0);
+        sort_by_phase(layout, &samples, stride, &mut self.coefficients);
     }
 
     /// Draws a spot at (x, y) in a window of this size: that of the table, of the size `spot_px`,
@@ -189,9 +189,11 @@ fn draw_rows<const PARTS: usize, const IS_SCALED: bool>(
     if first == end {
         return;
     }
+    // The same for all pixels where these are not scaled.
+    let of_columns = in_lanes(across.at(first).0);
     for row in down.lit[0]..down.lit[1] {
         if IS_SCALED {
-            combine_rows::<PARTS>(table, down.at(row), across.samples, lines);
+            combine_rows(table, down.at(row), across.samples, lines);
         }
         let dy = row as f32 - window.centre_px[1];
         let into = &mut into[row * window.groups..(row + 1) * window.groups];
@@ -201,14 +203,14 @@ fn draw_rows<const PARTS: usize, const IS_SCALED: bool>(
             let mut parts = [[0.0; GROUP_PX]; 5];
             if IS_SCALED {
                 for pixel in start.max(first)..(start + GROUP_PX).min(end) {
-                    let of_pixel = combine_columns::<PARTS>(lines, across.at(pixel));
+                    let of_pixel = combine_columns(lines, across.by_tap(pixel));
                     for (part, of_pixel) in parts.iter_mut().zip(of_pixel) {
                         part[pixel - start] = of_pixel;
                     }
                 }
             } else {
-                parts =
-                    combine_samples::<PARTS>(&table.coefficients, across.at(start), down.at(row));
+                let columns = (&of_columns, across.at(start).1);
+                parts = combine_samples::<PARTS>(&table.coefficients, columns, down.at(row));
             }
             let dx = start as f32 - window.centre_px[0];
             *into = fractions_of::<PARTS, IS_SCALED>(parts, [dx, dy], window);
@@ -221,47 +223,62 @@ fn draw_rows<const PARTS: usize, const IS_SCALED: bool>(
 #[inline(always)]
 fn combine_samples<const PARTS: usize>(
     table: &[f32],
-    (of_columns, columns): PixelTaps<'_>,
+    (of_columns, columns): (&[[PixelGroup; TAPS]; 3], [isize; TAPS]),
     (of_rows, rows): PixelTaps<'_>,
 ) -> [PixelGroup; 5] {
     let mut parts = [[0.0f32; GROUP_PX]; 5];
-    for tap in 0..TAPS {
+    let [weights, by_x, by_xx] = of_columns;
+    for down in 0..TAPS {
         let [mut value, mut slope, mut curvature] = [[0.0f32; GROUP_PX]; 3];
-        for (down, row) in rows.iter().enumerate() {
-            let start = (GROUP_PX as isize + columns[tap] + row) as usize;
-            let samples = table[start..].first_chunk::<GROUP_PX>().copied();
-            let samples = samples.unwrap_or_default();
-            let [weight, by_y, by_yy] = of_rows.map(|weights| weights[down]);
-            for lane in 0..GROUP_PX {
-                value[lane] += weight * samples[lane];
-                if PARTS > LIGHT {
-                    slope[lane] += by_y * samples[lane];
-                }
-                if PARTS > LIGHT_BY_PLACE {
-                    curvature[lane] += by_yy * samples[lane];
-                }
-            }
-        }
-        let [weight, by_x, by_xx] = of_columns.map(|weights| weights[tap]);
-        for lane in 0..GROUP_PX {
-            parts[0][lane] += weight * value[lane];
+        for tap in 0..TAPS {
+            let start = (GROUP_PX as isize + columns[tap] + rows[down]) as usize;
+            let Some(samples) = table.get(start..).and_then(<[f32]>::first_chunk) else {
+                continue;
+            };
+            value = plus(&value, &times(&weights[tap], samples));
             if PARTS > LIGHT {
-                parts[1][lane] += by_x * value[lane];
-                parts[2][lane] += weight * slope[lane];
+                slope = plus(&slope, &times(&by_x[tap], samples));
             }
             if PARTS > LIGHT_BY_PLACE {
-                parts[3][lane] += by_xx * value[lane];
-                parts[4][lane] += weight * curvature[lane];
+                curvature = plus(&curvature, &times(&by_xx[tap], samples));
             }
+        }
+        let [weights, by_y, by_yy] = of_rows;
+        parts[0] = plus_times(&parts[0], weights[down], &value);
+        if PARTS > LIGHT {
+            parts[1] = plus_times(&parts[1], weights[down], &slope);
+            parts[2] = plus_times(&parts[2], by_y[down], &value);
+        }
+        if PARTS > LIGHT_BY_PLACE {
+            parts[3] = plus_times(&parts[3], weights[down], &curvature);
+            parts[4] = plus_times(&parts[4], by_yy[down], &value);
         }
     }
     parts
 }
 
+/// Each weight in all lanes of a group.
+#[inline(always)]
+fn in_lanes(weights: &[[f32; TAPS]; 3]) -> [[PixelGroup; TAPS]; 3] {
+    let mut groups = [[[0.0; GROUP_PX]; TAPS]; 3];
+    for (groups, weights) in groups.iter_mut().zip(weights) {
+        for (group, weight) in groups.iter_mut().zip(weights) {
+            *group = [*weight; GROUP_PX];
+        }
+    }
+    groups
+}
+
+/// The sum and `factor` times the values.
+#[inline(always)]
+fn plus_times(sum: &PixelGroup, factor: f32, values: &PixelGroup) -> PixelGroup {
+    each_of(sum, values, |sum, value| sum + factor * value)
+}
+
 /// The samples of all phases along x in a row of the window, those in the pixels that are needed: the
 /// light and its derivatives along y.
 #[inline(always)]
-fn combine_rows<const PARTS: usize>(
+fn combine_rows(
     table: &PsfTable,
     (weights, rows): PixelTaps<'_>,
     [first, end]: [usize; 2],
@@ -271,53 +288,59 @@ fn combine_rows<const PARTS: usize>(
     // In whole groups, which rows have.
     let first = first / GROUP_PX * GROUP_PX;
     let end = end.next_multiple_of(GROUP_PX);
-    for (number, (line, weights)) in lines.iter_mut().zip(weights).enumerate() {
-        if PARTS == LIGHT && number == 1 {
-            continue;
-        }
+    let groups = (end - first) / GROUP_PX;
+    for line in &mut *lines {
         line.resize(per_px * stride, 0.0);
-        for (phase, line) in line.chunks_exact_mut(stride).enumerate() {
-            let of_rows = rows.map(|row| {
-                let start = table.layout.row([phase, 0], 0).wrapping_add_signed(row);
-                let samples = &table.coefficients[start + first..start + end];
-                samples.as_chunks::<GROUP_PX>().0
-            });
-            let [a, b, c, d] = of_rows;
-            let samples = a.iter().zip(b).zip(c.iter().zip(d));
-            let line = line[first..end].as_chunks_mut::<GROUP_PX>().0.iter_mut();
-            for (sum, ((a, b), (c, d))) in line.zip(samples) {
-                let mut all = [0.0f32; GROUP_PX];
-                for lane in 0..GROUP_PX {
-                    all[lane] = weights[0] * a[lane]
-                        + weights[1] * b[lane]
-                        + weights[2] * c[lane]
-                        + weights[3] * d[lane];
+    }
+    let [values, slopes, curvatures] = lines;
+    for phase in 0..per_px {
+        let start = table.layout.row([phase, 0], 0) + first;
+        let mut samples: [&[PixelGroup]; TAPS] = [&[]; TAPS];
+        // Loops, as what `map` calls is not compiled for the processor.
+        for (samples, row) in samples.iter_mut().zip(rows) {
+            let row = &table.coefficients[start.wrapping_add_signed(row)..][..end - first];
+            *samples = &row.as_chunks::<GROUP_PX>().0[..groups];
+        }
+        let of_phase = phase * stride + first..phase * stride + end;
+        let values = values[of_phase.clone()].as_chunks_mut::<GROUP_PX>().0;
+        let slopes = slopes[of_phase.clone()].as_chunks_mut::<GROUP_PX>().0;
+        let curvatures = curvatures[of_phase].as_chunks_mut::<GROUP_PX>().0;
+        let sums = values.iter_mut().zip(slopes).zip(curvatures);
+        for (group, ((value, slope), curvature)) in sums.enumerate().take(groups) {
+            let mut parts = [[0.0f32; GROUP_PX]; 3];
+            for tap in 0..TAPS {
+                let samples = &samples[tap][group];
+                for (part, weights) in parts.iter_mut().zip(weights) {
+                    *part = plus_times(part, weights[tap], samples);
                 }
-                *sum = all;
             }
+            (*value, *slope, *curvature) = (parts[0], parts[1], parts[2]);
         }
     }
 }
 
 /// As [`combine_samples`] in one pixel, from the samples of its row.
 #[inline(always)]
-fn combine_columns<const PARTS: usize>(
+fn combine_columns(
     [values, slopes, curvatures]: &[Vec<f32>; 3],
-    (weights, places): PixelTaps<'_>,
+    (weights, places): (&[TapWeights; TAPS], [isize; TAPS]),
 ) -> [f32; 5] {
-    let mut sums = [0.0f32; 5];
-    for (tap, place) in places.into_iter().enumerate() {
-        let [value, curvature] = [values, curvatures].map(|line| line[place as usize]);
-        let [weight, by_x, by_xx] = weights.map(|weights| weights[tap]);
-        sums[0] += weight * value;
-        if PARTS > LIGHT {
-            sums[1] += by_x * value;
-            sums[2] += weight * slopes[place as usize];
+    // Of one length, so that places are checked once.
+    let count = values.len();
+    let (slopes, curvatures) = (&slopes[..count], &curvatures[..count]);
+    let mut along_x = [0.0f32; 4];
+    let [mut slope, mut curvature] = [0.0f32; 2];
+    for (weights, place) in weights.iter().zip(places) {
+        let place = place as usize;
+        let value = values[place];
+        for (sum, weight) in along_x.iter_mut().zip(weights) {
+            *sum += weight * value;
         }
-        sums[3] += by_xx * value;
-        sums[4] += weight * curvature;
+        slope += weights[0] * slopes[place];
+        curvature += weights[0] * curvatures[place];
     }
-    sums
+    let [light, by_x, by_xx, _] = along_x;
+    [light, by_x, slope, by_xx, curvature]
 }
 
 /// The light, and its derivatives with respect to the spot's place and size, where the first of the
@@ -359,12 +382,11 @@ fn fractions_of<const PARTS: usize, const IS_SCALED: bool>(
 /// Coefficients along one axis of a component.
 #[derive(Debug, Clone, Default)]
 struct SplineProfile {
-    /// Phase by phase, each in whole groups of pixels.
-    coefficients: Vec<f32>,
-    /// First pixel with light, and the one after the last.
-    lit: [usize; 2],
+    /// Those of the samples with light, and zeros that fill the last group.
+    coefficients: Vec<PixelGroup>,
+    /// The first of these samples.
+    first: usize,
     cumulative: CumulativeProfile,
-    light: Vec<f32>,
 }
 
 impl SplineProfile {
@@ -387,74 +409,92 @@ impl SplineProfile {
         let reach_px = REACH_SIGMAS * sigma_px + 0.5;
         let place_px = offset_px + layout.centre_px();
         let bound = |pixel: f64| pixel.clamp(0.0, layout.side as f64) as usize;
-        self.lit = [bound(place_px - reach_px), bound(place_px + reach_px + 1.0)];
-        let [first, end] = self.lit;
+        let [first, end] = [bound(place_px - reach_px), bound(place_px + reach_px + 1.0)];
+        self.first = first * per_px;
         let samples = (end - first) * per_px;
         let first_px = first as f64 - MARGIN as f64 * step_px - 0.5 - place_px;
-        let places = samples + 2 * MARGIN;
+        let places = samples.next_multiple_of(GROUP_PX) + 2 * MARGIN;
         // A pixel has two edges.
         self.cumulative
             .fill(first_px, step_px, sigma_px, places + per_px);
-        self.light.resize(samples, 0.0);
-        self.coefficients.clear();
-        self.coefficients.resize(per_px * layout.stride, 0.0);
+        let groups = samples.div_ceil(GROUP_PX);
+        self.coefficients.resize(groups, [0.0; GROUP_PX]);
         let edges = self.cumulative.values();
-        filter(edges, per_px, &Self::FILTER, &mut self.light);
-        let light = &self.light;
-        for (phase, row) in self
-            .coefficients
-            .chunks_exact_mut(layout.stride)
-            .enumerate()
-        {
-            let of_phase = light.iter().skip(phase).step_by(per_px);
-            for (coefficient, light) in row[first..end].iter_mut().zip(of_phase) {
-                *coefficient = *light;
-            }
+        filter(edges, per_px, &Self::FILTER, &mut self.coefficients);
+        for rest in &mut self.coefficients.as_flattened_mut()[samples..] {
+            *rest = 0.0;
         }
     }
 }
 
 /// Weighted sums of the light of each pixel and the next ones, from the cumulative light at their
 /// edges, which are `per_px` samples apart.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "lanes of several arrays read best as indices"
+)]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn filter(edges: &[f32], per_px: usize, weights: &[f32; 5], into: &mut [f32]) {
-    let count = into.len();
-    into.fill(0.0);
-    for (next, weight) in weights.iter().enumerate() {
-        let before = &edges[next..next + count];
-        let after = &edges[next + per_px..next + per_px + count];
-        for (sum, (before, after)) in into.iter_mut().zip(before.iter().zip(after)) {
-            *sum += weight * (after - before);
+fn filter(edges: &[f32], per_px: usize, weights: &[f32; 5], into: &mut [PixelGroup]) {
+    /// Edges that a group takes.
+    const EDGES: usize = GROUP_PX + SplineProfile::FILTER.len() - 1;
+    for (group, into) in into.iter_mut().enumerate() {
+        let start = group * GROUP_PX;
+        let edges_from = |at: usize| edges.get(at..).and_then(<[f32]>::first_chunk::<EDGES>);
+        let mut sum = [0.0; GROUP_PX];
+        if let (Some(before), Some(after)) = (edges_from(start), edges_from(start + per_px)) {
+            for (next, weight) in weights.iter().enumerate() {
+                for lane in 0..GROUP_PX {
+                    sum[lane] += weight * (after[lane + next] - before[lane + next]);
+                }
+            }
+        }
+        *into = sum;
+    }
+}
+
+/// Adds a component to samples in rows of `stride`.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn add_component_samples(
+    stride: usize,
+    [across, down]: &[SplineProfile; 2],
+    share: f32,
+    samples: &mut [f32],
+) {
+    let rows = samples.chunks_exact_mut(stride).skip(down.first);
+    for (row, of_row) in rows.zip(down.coefficients.as_flattened()) {
+        let light = share * of_row;
+        let groups = row[across.first..].as_chunks_mut::<GROUP_PX>().0;
+        for (sum, columns) in groups.iter_mut().zip(&across.coefficients) {
+            *sum = plus_times(sum, light, columns);
         }
     }
 }
 
-/// Adds a component to a table.
-#[allow(
-    clippy::needless_range_loop,
-    reason = "rows of several arrays read best as indices"
-)]
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn add_component_samples(
+/// Sorts samples in rows of `stride` by the phases of a table.
+fn sort_by_phase(layout: TableLayout, samples: &[f32], stride: usize, table: &mut [f32]) {
+    match layout.per_px {
+        2 => sort_by_phase_of::<2>(layout, samples, stride, table),
+        3 => sort_by_phase_of::<3>(layout, samples, stride, table),
+        4 => sort_by_phase_of::<4>(layout, samples, stride, table),
+        5 => sort_by_phase_of::<5>(layout, samples, stride, table),
+        _ => sort_by_phase_of::<{ TableLayout::MAX_PER_PX }>(layout, samples, stride, table),
+    }
+}
+
+/// [`sort_by_phase`] of `N` samples in a pixel.
+fn sort_by_phase_of<const N: usize>(
     layout: TableLayout,
-    profiles: &[SplineProfile; 2],
-    share: f32,
+    samples: &[f32],
+    stride: usize,
     table: &mut [f32],
 ) {
-    let [across, down] = profiles;
-    let first = across.lit[0] / GROUP_PX * GROUP_PX;
-    let end = across.lit[1].next_multiple_of(GROUP_PX);
-    for down_phase in 0..layout.per_px {
-        let of_rows = &down.coefficients[down_phase * layout.stride..];
-        for (phase, columns) in across.coefficients.chunks_exact(layout.stride).enumerate() {
-            let columns = columns[first..end].as_chunks::<GROUP_PX>().0;
-            for row in down.lit[0]..down.lit[1] {
-                let light = share * of_rows[row];
-                let start = layout.row([phase, down_phase], row);
-                let into = &mut table[start + first..start + end];
-                for (into, columns) in into.as_chunks_mut::<GROUP_PX>().0.iter_mut().zip(columns) {
-                    *into = each_of(into, columns, |sum, column| sum + light * column);
-                }
+    for (down, row) in samples.chunks_exact(stride).enumerate() {
+        let pixels = &row.as_chunks::<N>().0[..layout.side];
+        for phase in 0..N {
+            let start = layout.row([phase, down % N], down / N);
+            let into = &mut table[start..start + layout.side];
+            for (into, of_pixel) in into.iter_mut().zip(pixels) {
+                *into = of_pixel[phase];
             }
         }
     }

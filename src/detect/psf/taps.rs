@@ -19,18 +19,20 @@ pub(super) struct TableLayout {
 }
 
 impl TableLayout {
+    /// Most samples in a pixel.
+    pub const MAX_PER_PX: usize = 6;
+
     /// For components of this size that reach this far from the centre, in pixels.
     pub fn new(sigma_px: f64, reach_px: f64) -> Self {
         /// Largest distance of the samples over the width of a component, pixel included: the error of
         /// the interpolation is then below two thousandths of the component's peak.
         const MAX_STEP: f64 = 0.5;
-        const MAX_PER_PX: usize = 6;
         let width_px = (sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();
         let per_px = (1.0 / (MAX_STEP * width_px)).ceil() as usize;
         let radius = (reach_px.ceil() as usize).clamp(1, MAX_WINDOW_PX);
         let side = 2 * radius + 3;
         Self {
-            per_px: per_px.clamp(2, MAX_PER_PX),
+            per_px: per_px.clamp(2, Self::MAX_PER_PX),
             side,
             stride: (side + GROUP_PX - 1).next_multiple_of(GROUP_PX),
         }
@@ -46,6 +48,11 @@ impl TableLayout {
         self.per_px * self.per_px * self.side * self.stride + 2 * GROUP_PX
     }
 
+    /// Samples along each axis.
+    pub fn samples(&self) -> usize {
+        self.per_px * self.side
+    }
+
     /// Where a row of the samples of a phase begins: those with the same place in their pixels.
     pub fn row(&self, [across, down]: [usize; 2], row: usize) -> usize {
         GROUP_PX + ((down * self.per_px + across) * self.side + row) * self.stride
@@ -58,6 +65,8 @@ struct Taps {
     /// Weights of the samples for the light, and for its first and second derivative with respect
     /// to the pixel's place.
     weights: [[f32; TAPS]; 3],
+    /// The same of each sample, as a vector.
+    by_tap: [TapWeights; TAPS],
     /// Where they are in the table, along this axis.
     places: [isize; TAPS],
     /// Pixels of the table that hold the first and the last of them.
@@ -107,8 +116,11 @@ impl Taps {
             }
             place
         });
+        let weights = weights.map(|(row, unit)| row.map(|weight| (weight * unit / scale) as f32));
+        let [value, slope, curvature] = weights;
         Self {
-            weights: weights.map(|(row, unit)| row.map(|weight| (weight * unit / scale) as f32)),
+            weights,
+            by_tap: std::array::from_fn(|tap| [value[tap], slope[tap], curvature[tap], 0.0]),
             places,
             pixels,
         }
@@ -172,6 +184,13 @@ impl AxisTaps {
         };
     }
 
+    /// The weights of each sample of a pixel that has its own, and where these are in the table.
+    #[inline(always)]
+    pub fn by_tap(&self, pixel: usize) -> (&[TapWeights; TAPS], [isize; TAPS]) {
+        let taps = &self.pixels[pixel];
+        (&taps.by_tap, taps.places)
+    }
+
     /// The weights of a pixel, and where its samples are in the table.
     #[inline(always)]
     pub fn at(&self, pixel: usize) -> PixelTaps<'_> {
@@ -188,6 +207,8 @@ impl AxisTaps {
     }
 }
 
+/// The weights of a sample for the light and its first and second derivative; the last number fills a vector.
+pub(super) type TapWeights = [f32; 4];
 /// The weights of the samples of a pixel along an axis, and where they are.
 pub(super) type PixelTaps<'a> = (&'a [[f32; TAPS]; 3], [isize; TAPS]);
 

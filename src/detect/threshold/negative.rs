@@ -43,6 +43,8 @@ pub(crate) struct Extrema {
     grid: CellGrid,
     /// By cell, whether the background bends there.
     is_bent: Vec<bool>,
+    /// By column of pixels, the column of cells and of parts: divisions take long.
+    columns: Vec<[u32; 2]>,
     /// The mesh interpolated to a row.
     nodes: Vec<[f32; 2]>,
     /// A row in standard deviations.
@@ -76,6 +78,9 @@ impl Extrema {
         let parts = most.clamp(1, MAX_PARTS);
         self.size = size;
         self.parts = parts;
+        let column_of = |x: usize| [grid.cell_at(x, 0), x * parts / size.width].map(|at| at as u32);
+        self.columns.clear();
+        self.columns.extend((0..size.width).map(column_of));
         self.heights.resize_with(parts * parts, Sides::default);
         for sides in &mut self.heights {
             sides.pixels = 0;
@@ -106,10 +111,11 @@ impl Extrema {
                 while bits != 0 {
                     let x = first + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
-                    if self.is_bent[self.grid.cell_at(x, y)] {
+                    let [column, part] = self.columns[x].map(|at| at as usize);
+                    if is_bent[column] {
                         continue;
                     }
-                    let sides = &mut self.heights[first_part + x * self.parts / width];
+                    let sides = &mut self.heights[first_part + part];
                     let (height, heights) = if is_above {
                         (self.row[x], &mut sides.positive)
                     } else {
@@ -152,18 +158,19 @@ fn inner_columns(first: usize, width: usize) -> u64 {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn mark_extrema([above, row, below]: [&Widened<f32>; 3]) -> [u64; 2] {
     let [mut maxima, mut minima] = [[0u8; BLOCK_PX]; 2];
+    // Not those of `f32`, which take care of NaN, of which a filtered frame has none.
+    let higher = |a: f32, b: f32| if a > b { a } else { b };
+    let lower = |a: f32, b: f32| if a < b { a } else { b };
     let marks = maxima.iter_mut().zip(&mut minima);
     for (x, (maximum, minimum)) in marks.enumerate() {
-        let value = row[x + 1];
+        let (value, right) = (row[x + 1], row[x + 2]);
         let [a, b, c, d] = [above[x], above[x + 1], above[x + 2], row[x]];
-        let [e, f, g, h] = [below[x], below[x + 1], below[x + 2], row[x + 2]];
+        let [e, f, g] = [below[x], below[x + 1], below[x + 2]];
+        let highest = higher(higher(higher(a, b), higher(c, d)), higher(higher(e, f), g));
+        let lowest = lower(lower(lower(a, b), lower(c, d)), lower(lower(e, f), g));
         // Of equal neighbors in a row, the first counts.
-        let is_over = (value > a) & (value > b) & (value > c) & (value > d);
-        let is_over = is_over & (value > e) & (value > f) & (value > g) & (value >= h);
-        let is_under = (value < a) & (value < b) & (value < c) & (value < d);
-        let is_under = is_under & (value < e) & (value < f) & (value < g) & (value <= h);
-        *maximum = u8::from(is_over);
-        *minimum = u8::from(is_under);
+        *maximum = u8::from((value > highest) & (value >= right));
+        *minimum = u8::from((value < lowest) & (value <= right));
     }
     [packed(&maxima), packed(&minima)]
 }

@@ -493,7 +493,7 @@ fn add_values(images: &ComponentImages, parts: &[f32], sums: &mut [Vec<Block>]) 
 #[derive(Debug, Clone)]
 pub(super) struct ComponentEquations {
     images: ImageClasses,
-    /// Sums of the products of images i ≤ j in row i and column j; where the PSF changes, weighted
+    /// Sums of the products of images in row i and column j; where the PSF changes, weighted
     /// with the product of the parts that two shares have: both of the centre, one, none.
     products: Vec<DMatrix<f64>>,
     /// Products of the images and the values, for each set of shares.
@@ -516,6 +516,7 @@ impl ComponentEquations {
                     }
                 }
             }
+            matrix.fill_lower_triangle_with_upper_triangle();
             matrix
         };
         let values = |blocks: Vec<Block>| blocks.into_iter().flatten().map(sum_of).collect();
@@ -558,17 +559,22 @@ impl ComponentEquations {
             matrix[(class, class)] += weight;
             right[class] += weight * share;
         }
-        for (set, of_set) in self.right.iter().enumerate() {
-            let class = |set: usize, image: usize| {
-                class_of[set * components + self.images.first_components[image]]
-            };
-            for i in 0..self.images.first_components.len() {
-                let at = class(set, i);
-                right[at] += of_set[i];
-                for other in 0..self.right.len() {
-                    let products = &self.products[set + other];
-                    for j in 0..self.images.first_components.len() {
-                        matrix[(class(other, j), at)] += products[(i.min(j), i.max(j))];
+        // Of the images with the shares of each set.
+        let class_of_image = |set: usize| -> Vec<usize> {
+            let images = self.images.first_components.iter();
+            images
+                .map(|component| class_of[set * components + component])
+                .collect()
+        };
+        let classes: Vec<Vec<usize>> = (0..self.right.len()).map(class_of_image).collect();
+        for (set, of_set) in classes.iter().enumerate() {
+            for (i, &at) in of_set.iter().enumerate() {
+                right[at] += self.right[set][i];
+                let column = &mut matrix.as_mut_slice()[at * count..(at + 1) * count];
+                for (other, of_other) in classes.iter().enumerate() {
+                    let products = self.products[set + other].column(i);
+                    for (&class, product) in of_other.iter().zip(products.iter()) {
+                        column[class] += product;
                     }
                 }
             }

@@ -59,8 +59,10 @@ pub(super) struct StarFitter {
     /// Row by row, as the pixels of the window.
     fractions: Vec<MomentShares>,
     local: LocalPsf,
-    /// The spot of all stars, where they have the same.
+    /// The spot of all stars, where they have the same,
     common: LocalPsf,
+    /// and the PSF whose it is.
+    tabulated: Option<EffectivePsf>,
     /// The last spot drawn from its table.
     drawn: Vec<ShareGroup>,
     buffers: DrawBuffers,
@@ -77,6 +79,10 @@ impl StarFitter {
     /// Tabulates a PSF that is the same everywhere: stars are drawn with it, as long as their moments
     /// are held. Call it before each other PSF.
     pub fn tabulate(&mut self, psf: &EffectivePsf) {
+        if self.tabulated.as_ref() == Some(psf) {
+            return;
+        }
+        self.tabulated = Some(psf.clone());
         self.common.clear();
         if psf.is_uniform() {
             psf.at(0.0, 0.0, &mut self.common);
@@ -87,7 +93,9 @@ impl StarFitter {
     /// Moves all stars by a step of their fits to `psf`; sets their own moments where these are
     /// `free`.
     pub fn step(&mut self, stars: &mut [PsfStar], psf: &EffectivePsf, free: bool) {
-        self.tabulate(psf);
+        if !free {
+            self.tabulate(psf);
+        }
         for star in stars {
             if !free {
                 self.step_one::<PLACE>(star, psf);
@@ -463,6 +471,8 @@ fn first_fit(
     fitter: &mut StarFitter,
 ) -> Option<PsfStar> {
     const STEPS: usize = 6;
+    /// Steps shorter than this are the last, in pixels and in ln σ: the fits go on with other spots.
+    const SETTLED: f64 = 2e-3;
     /// Largest elongation of a star, as in [`SpotMoments`]: axes in a ratio of 4.5.
     const MAX_ELONGATION: f64 = 1.5;
     /// A fit has converged when its last step is shorter, in pixels and in ln σ.
@@ -497,6 +507,9 @@ fn first_fit(
         star.moments = [star.moments[0] + by_size, e1, e2];
         let distance = libm::hypot(star.spot.x - before.x, star.spot.y - before.y);
         moved = distance.max(by_size.abs());
+        if moved < SETTLED {
+            break;
+        }
     }
     let is_near = libm::hypot(star.spot.x - spot.x, star.spot.y - spot.y) < 1.0 + maps.spot_px;
     let is_finite = star.moments.iter().all(|moment| moment.is_finite());
