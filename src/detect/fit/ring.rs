@@ -196,6 +196,10 @@ impl<const N: usize> SurfaceSums<N> {
 }
 
 /// Sums over the pixels near a surface.
+#[allow(
+    clippy::needless_range_loop,
+    reason = "triangles of known lengths, which become vectors"
+)]
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn sums_near<const N: usize>(ring: &Ring, near: &NearSurface<N>) -> SurfaceSums<N> {
     let mut matrix = [[[0.0f32; GROUP_PX]; N]; N];
