@@ -4,40 +4,15 @@
 //! fitted with round spots of one size; what only the faint ones need (the noise of the filtered frame, the form of
 //! the spots, close pairs) is not measured.
 
-use super::candidates::{Peak, RawPeak, RawPeakFinder};
 use super::config::DetectConfig;
-use super::detection::{Detection, DetectionFlags, Detections};
+use super::detection::Detections;
 use super::error::{self, DetectError};
 use super::filter::Kernel;
-use super::fit::{BatchStart, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit};
-use super::measure::{Core, StarShape};
+use super::fit::FrameMaps;
+use super::measure::spot_size_px;
 use super::pixels::View;
-use super::star_model::{BrightPeak, MAX_STARS, noise_of_fits};
 use super::workspace::Workspace;
-use crate::base::coords::PixelPoint;
-use crate::base::size::Size;
-use crate::base::statistics::median;
 use crate::frame::{Frame, MIN_SIDE_PX};
-use arrayvec::ArrayVec;
-use std::mem;
-
-/// Fewer stars do not tell a pointing that is sure.
-const MIN_STARS: usize = 8;
-/// Places along each side of the frame, …
-const CELLS: usize = 6;
-/// … and the part of the stars that may be in one of them: of stars spread by chance over all of them, more are
-/// in one place in less than one frame of a hundred.
-const MOST_IN_CELL: f64 = 0.12;
-/// Relative error of the spot to begin with: its size is that of all stars, and it is not quite a Gaussian.
-const MODEL_ERROR: f64 = 0.05;
-
-/// The brightest stars; holds the buffers.
-#[derive(Debug, Clone, Default)]
-pub(super) struct BrightestStars {
-    /// The peaks that are measured, most significant first.
-    peaks: Vec<RawPeak>,
-    fits: FitBuffers,
-}
 
 /// Finds up to `count` of the brightest stars of `frame`, spread over it, into `found`; none where fewer than
 /// eight stand out in single pixels. Pixels are looked at once, and for the background a sixteenth of them again.
@@ -91,7 +66,7 @@ pub fn detect_brightest_into(
     maps.spot_px = config.spot_sigma_px.unwrap_or(spot_px);
     maps.matched_gain = Kernel::for_spot(maps.spot_px).matched_gain();
     brightest.select(raw_peaks, &maps, count);
-    brightest.measure(&maps, &mut found.sources);
+    brightest.measure(&mut maps, config.spot_sigma_px, &mut found.sources);
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = maps.spot_px;
@@ -99,171 +74,10 @@ pub fn detect_brightest_into(
     Ok(())
 }
 
-/// The median size of the brightest spots, in pixels; `None` where there are too few.
-fn spot_size_px(raw_peaks: &RawPeakFinder, maps: &FrameMaps<'_>) -> Option<f64> {
-    let peaks = raw_peaks.peaks.iter();
-    let of_light = peaks.filter(|peak| !peak.saturated && is_of_light(peak, maps));
-    let mut sizes_px: ArrayVec<f64, MAX_STARS> = of_light
-        .take(MAX_STARS)
-        .map(|peak| peak.size_in(&maps.view))
-        .collect();
-    (sizes_px.len() >= MIN_STARS).then(|| median(&mut sizes_px))
-}
-
-fn is_of_light(peak: &RawPeak, maps: &FrameMaps<'_>) -> bool {
-    !peak.contrast(maps).is_sharper_than_any_spot()
-}
-
-impl BrightestStars {
-    /// Selects the brightest peaks, but no more in one place than chance explains.
-    fn select(&mut self, raw_peaks: &RawPeakFinder, maps: &FrameMaps<'_>, count: usize) {
-        let chosen = &mut self.peaks;
-        chosen.clear();
-        let most = ((MOST_IN_CELL * count as f64).ceil() as usize).max(2);
-        let mut in_cell = [0; CELLS * CELLS];
-        for peak in &raw_peaks.peaks {
-            let cell = &mut in_cell[cell_of(peak, maps.view.size())];
-            if *cell < most && is_of_light(peak, maps) && !is_of_halo(peak, chosen, maps) {
-                *cell += 1;
-                chosen.push(*peak);
-            }
-            if chosen.len() == count {
-                break;
-            }
-        }
-    }
-
-    /// Measures them.
-    fn measure(&mut self, maps: &FrameMaps<'_>, sources: &mut Vec<Detection>) {
-        let Self { peaks, fits } = self;
-        let shape = shape_of(peaks, maps);
-        if shape.is_long() {
-            return;
-        }
-        if shape.is_elongated() {
-            sources.extend(peaks.iter().filter_map(|peak| of_core(peak, maps)));
-            return;
-        }
-        let of_peak = |(number, peak): (usize, &RawPeak)| BatchStart {
-            number,
-            spot: peak.start(maps),
-            spot_px: maps.spot_px,
-        };
-        let mut config = FitConfig {
-            spot_px: maps.spot_px,
-            free_size: false,
-            noise: NoiseModel {
-                shot_adu: 0.0,
-                model_error2: MODEL_ERROR * MODEL_ERROR,
-            },
-        };
-        let unsaturated = peaks.iter().enumerate().filter(|(_, peak)| !peak.saturated);
-        let bright = unsaturated.take(MAX_STARS).map(of_peak);
-        config.noise = noise_of_fits(maps, bright, &config, fits);
-        let starts = peaks.iter().enumerate().map(of_peak);
-        let mut batch = mem::take(&mut fits.batch);
-        batch.fit(maps, starts, &config, |number, fit, _| {
-            let peak = &peaks[number];
-            let of_fit = fit.and_then(|fit| of_fit(&fit, peak, maps));
-            sources.extend(of_fit.or_else(|| of_core(peak, maps)));
-        });
-        fits.batch = batch;
-    }
-}
-
-/// The shape of the stars: a round spot may settle anywhere along elongated ones.
-fn shape_of(peaks: &[RawPeak], maps: &FrameMaps<'_>) -> StarShape {
-    /// More stars do not tell more.
-    const ENOUGH: usize = 40;
-    let of_own_region = peaks.iter().take(ENOUGH).enumerate();
-    let peaks: ArrayVec<Peak, ENOUGH> = of_own_region.map(|(i, peak)| peak.as_peak(i)).collect();
-    StarShape::measure(maps, &peaks)
-}
-
-/// The star of a fit; `None` where its place is not that of the peak, or not known.
-fn of_fit(fit: &SpotFit, peak: &RawPeak, maps: &FrameMaps<'_>) -> Option<Detection> {
-    /// A spot is wider than the stars from this ratio of the sizes on.
-    const WIDE: f64 = 1.6;
-    /// Chi² above what is expected is chance below this many of its standard deviations.
-    const CHANCE_SIGMAS: f64 = 3.0;
-    let spot = fit.spots[0];
-    if peak.saturated || !spot.has_position(maps.spot_px) || spot.flux <= 0.0 {
-        return None;
-    }
-    // What the model does not explain, as light of a neighbor, moves the star, too.
-    let freedom = fit.degrees_of_freedom.max(1.0);
-    let by_chance = 1.0 + CHANCE_SIGMAS * (2.0 / freedom).sqrt();
-    let excess = fit.chi2 / freedom;
-    let excess = if excess > by_chance { excess } else { 1.0 };
-    let star = detection(maps, &spot, excess.sqrt());
-    Some(Detection {
-        flags: DetectionFlags {
-            extended: peak.size_in(&maps.view) > WIDE * maps.spot_px,
-            ..star.flags
-        },
-        ..star
-    })
-}
-
-/// The star of the light above half of the height, as where it is saturated.
-fn of_core(peak: &RawPeak, maps: &FrameMaps<'_>) -> Option<Detection> {
-    let core = Core::at(maps, &peak.as_peak(0))?;
-    let spot = SpotEstimate {
-        x: core.x,
-        y: core.y,
-        sigma_x: core.sigma_px,
-        sigma_y: core.sigma_px,
-        flux: peak.flux_adu * core.area_px.max(9.0) / 9.0,
-        noise_flux: peak.flux_adu / f64::from(peak.snr),
-        ..SpotEstimate::default()
-    };
-    let star = detection(maps, &spot, 1.0);
-    Some(Detection {
-        flags: DetectionFlags {
-            saturated: peak.saturated,
-            ..star.flags
-        },
-        ..star
-    })
-}
-
-/// The detection of a spot, with its errors times `excess`, in coordinates of the frame.
-fn detection(maps: &FrameMaps<'_>, spot: &SpotEstimate, excess: f64) -> Detection {
-    let view = &maps.view;
-    Detection {
-        position: PixelPoint::new(spot.x + view.x0 as f64, spot.y + view.y0 as f64),
-        sigma_x_px: spot.sigma_x * excess,
-        sigma_y_px: spot.sigma_y * excess,
-        flux_adu: spot.flux,
-        peak_adu: 0.0,
-        snr: spot.flux / spot.noise_flux,
-        flags: DetectionFlags::default(),
-    }
-}
-
-/// The number of the place that a peak is in.
-fn cell_of(peak: &RawPeak, size: Size) -> usize {
-    peak.y * CELLS / size.height * CELLS + peak.x * CELLS / size.width
-}
-
-/// Whether a peak is of the light around one of the brighter ones.
-fn is_of_halo(peak: &RawPeak, brighter: &[RawPeak], maps: &FrameMaps<'_>) -> bool {
-    /// How far the halo of a star reaches, in standard deviations of its spot, …
-    const REACH_SIGMAS: f64 = 5.0;
-    /// … and what is in it, over the star.
-    const HALO: f64 = 0.1;
-    let reach_px = REACH_SIGMAS * maps.width_px();
-    brighter.iter().any(|star| {
-        let (dx, dy) = (star.x as f64 - peak.x as f64, star.y as f64 - peak.y as f64);
-        let is_faint = peak.flux_adu < HALO * star.flux_adu || (star.saturated && peak.saturated);
-        is_faint && dx * dx + dy * dy < reach_px * reach_px
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::DetectConfig;
+    use crate::detect::{DetectConfig, Detection};
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;

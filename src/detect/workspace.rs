@@ -1,9 +1,8 @@
 //! Buffers of detection.
 
 use super::background::FrameBackground;
-use super::brightest::BrightestStars;
 use super::detection::Detections;
-use super::measure::MeasureBuffers;
+use super::measure::{BrightestStars, MeasureBuffers};
 use super::pixels::View;
 use super::psf::PIXEL_VARIANCE_PX2;
 use super::search::FrameSearch;
@@ -147,6 +146,11 @@ impl Workspace {
             spot_px: (widest_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt(),
         };
         search.run()
+    }
+
+    /// Whether the work is to end now.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        self.interrupt.is_due()
     }
 
     /// Whether so many bytes fit its memory beside `frame`.

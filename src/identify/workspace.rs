@@ -237,7 +237,7 @@ impl Workspace {
         let mut search = TriangleSearch::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
-        if found.is_none() && !matches!(tried, Choices::AtOnce) {
+        if found.is_none() && !matches!(tried, Choices::AtOnce) && !search.is_interrupted() {
             for choice in others.choices(whole, other_fields, *effort) {
                 (search, found) = choice.search(search, whole, priors);
                 let log10 = search.best_log10_false_alarm();

@@ -1,7 +1,7 @@
 //! Finds which catalogue stars in a frame were detected: those that a detection has the name of.
 
 use super::IdentifiedFrame;
-use crate::base::neighbors::PointTree;
+use crate::base::neighbors::PointGrid;
 use crate::catalog::StarIndex;
 use crate::detect::PIXEL_VARIANCE_PX2;
 use crate::identify::{PredictedStar, StarMatch};
@@ -68,7 +68,7 @@ fn light_of(mag: f32) -> f64 {
 
 /// The light of stars that are too faint to be detected. The background contains its mean.
 struct FaintLight {
-    places: PointTree,
+    places: PointGrid,
     /// Of each of them.
     light: Vec<f64>,
     /// Within this distance the mean is taken.
@@ -99,8 +99,10 @@ impl FaintLight {
             .map(|star| &predicted[star])
             .collect();
         let reach_px = REACH * resolved_px;
+        let mut places = PointGrid::default();
+        places.fill(faint.len(), faint.iter().map(|star| star.pixel));
         Self {
-            places: PointTree::new(faint.iter().map(|star| star.pixel)),
+            places,
             light: faint.iter().map(|star| light_of(star.v_mag)).collect(),
             reach_px,
             // The integral of the filter's response, over the area within reach.
@@ -125,7 +127,8 @@ impl FaintLight {
 pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) -> Association {
     let matches = &frame.identification.matches;
     let detections = detections_of(predicted, matches);
-    let places = PointTree::new(predicted.iter().map(|star| star.pixel));
+    let mut places = PointGrid::default();
+    places.fill(predicted.len(), predicted.iter().map(|star| star.pixel));
     let spot_sigma_px = frame.detections.spot_sigma_px;
     let resolved_px = resolved_px(spot_sigma_px);
     let width_px = (spot_sigma_px.powi(2) + PIXEL_VARIANCE_PX2).sqrt();

@@ -1,7 +1,7 @@
 //! What the stages need and what does not change from frame to frame.
 
 use super::fixed_camera::FixedCamera;
-use super::pointing::PointingBuffers;
+use super::pointing_buffers::PointingBuffers;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
 use crate::base::interrupt::Interrupt;

@@ -25,6 +25,7 @@ mod other_stars;
 mod outcome;
 mod place_time;
 mod pointing;
+mod pointing_buffers;
 mod prepared;
 mod raw_color;
 mod solution;

@@ -3,7 +3,7 @@
 //! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). There is less of it in a
 //! coarser frame; and it is wider than they are, so that in single pixels they may stand out.
 
-use super::pointing::POINTING_STARS;
+use super::pointing_buffers::POINTING_STARS;
 use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
 use crate::detect::{self, DetectConfig, Detections, detect, detect_brightest_into};
@@ -111,6 +111,7 @@ impl OtherFields for OtherStars<'_> {
 
     fn field(&self, number: usize) -> Option<&StarField> {
         let detected = || match FACTORS.get(number) {
+            _ if self.detector.is_interrupted() => None,
             Some(&factor) => self.detected(factor),
             None => self.brightest(),
         };

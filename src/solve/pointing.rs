@@ -6,22 +6,13 @@
 use super::context::{Context, Workspace};
 use super::identification::prepare;
 use super::outcome::{Outcome, Reason};
+use super::pointing_buffers::{POINTING_STARS, PointingBuffers};
 use super::star_field::fill_field;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{DetectError, Detections, detect_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
-use crate::identify::{Identification, Priors, ScalePrior, StarField};
-
-/// Stars that are measured: enough for an attitude that all stars would not make much better.
-pub(super) const POINTING_STARS: usize = 100;
-
-/// The brightest stars of a frame; holds the buffers.
-#[derive(Debug, Default)]
-pub(super) struct PointingBuffers {
-    detections: Detections,
-    field: Option<StarField>,
-}
+use crate::identify::{Identification, Priors, ScalePrior};
 
 /// Attitude and optics of a frame from its brightest stars; `None` where they do not show beyond doubt where it
 /// points, and [`solve_frame`](super::solve_frame()) may find out. Nothing is allocated after the first frame of a

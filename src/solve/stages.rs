@@ -7,7 +7,8 @@ use super::identification::{SecondImages, identify_stars, observation, through_a
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::place_time::{ConfirmedPlaceTime, PlaceTime, settle};
-use super::pointing::{POINTING_STARS, search_at_once};
+use super::pointing::search_at_once;
+use super::pointing_buffers::POINTING_STARS;
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::Solution;

@@ -11,7 +11,7 @@ const CORE_LEVEL: f64 = 0.5;
 
 /// The 8-connected pixels about a peak that are above half of its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Core {
+pub(super) struct Core {
     /// Centre, weighted with the light above half of the height, in pixels.
     pub x: f64,
     /// Centre, weighted with the light above half of the height, in pixels.

@@ -1,5 +1,6 @@
 //! Step 6: positions, fluxes and flags of the sources.
 
+mod brightest;
 mod centroid;
 mod core;
 mod estimate;
@@ -11,7 +12,7 @@ mod saturated_area;
 mod shape;
 mod star_shape;
 
-pub(crate) use core::Core;
+pub(crate) use brightest::{BrightestStars, spot_size_px};
 pub(crate) use estimate::clamp_to_frame;
 pub(crate) use measurement::{MeasureBuffers, Measurement};
 pub(crate) use ring::Ring;

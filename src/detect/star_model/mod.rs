@@ -10,7 +10,7 @@ mod non_gaussian;
 mod spot_size;
 
 pub(crate) use bright_stars::{BrightPeak, fit_bright_stars, isolated_peaks};
-pub(crate) use noise_model::{StarModel, noise_of, noise_of_fits, star_model};
+pub(crate) use noise_model::{StarModel, noise_of, rough_star_model, star_model};
 pub(crate) use spot_size::{
     BrightStars, DEFAULT_SPOT_PX, MAX_STARS, SpotSize, spot_size, weighted_size,
 };

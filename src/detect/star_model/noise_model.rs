@@ -49,7 +49,7 @@ pub(crate) fn star_model(
     buffers: &mut FitBuffers,
 ) -> StarModel {
     let of_all_sizes = stars.clone();
-    stars.retain(|fit| libm::log(fit.spot_px / maps.spot_px).abs() < libm::log(MODE_WIDTH));
+    stars.retain(|fit| has_size_of(maps, fit));
     // The start must not have too little noise: else a fit follows the brightest pixel wherever it
     // is.
     let brightest = stars.first().map(|fit| fit.spots[0]);
@@ -92,24 +92,41 @@ pub(crate) fn star_model(
     }
 }
 
-/// The noise model from the residuals of fits with spots of one size, and a rough model of the noise, which begin at
-/// `starts`: a round of [`star_model`].
-pub(crate) fn noise_of_fits(
+/// Size and noise of the stars from one fit of each, which begin at `starts`, with a rough model of the noise: a round
+/// of [`star_model`].
+pub(crate) fn rough_star_model(
     maps: &FrameMaps<'_>,
     starts: impl Iterator<Item = BatchStart>,
-    config: &FitConfig,
+    rough: NoiseModel,
     buffers: &mut FitBuffers,
-) -> NoiseModel {
+) -> StarModel {
+    let config = FitConfig {
+        spot_px: maps.spot_px,
+        free_size: true,
+        noise: rough,
+    };
     let mut sums = NoiseSums::default();
+    let mut stars = BrightStars::new();
     let mut batch = mem::take(&mut buffers.batch);
-    batch.fit(maps, starts, config, |_, fit, window| {
-        if let Some(fit) = fit {
-            buffers.window.copy_from(window);
-            sums.add_star(buffers, &fit, config, None);
-        }
+    batch.fit(maps, starts, &config, |_, fit, window| {
+        let Some(fit) = fit.filter(|fit| has_size_of(maps, fit)) else {
+            return;
+        };
+        buffers.window.copy_from(window);
+        sums.add_star(buffers, &fit, &config, None);
+        let _ = stars.try_push(fit);
     });
     buffers.batch = batch;
-    believable(sums.solve(), maps)
+    StarModel {
+        spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),
+        noise: believable(sums.solve(), maps),
+        is_non_gaussian: false,
+    }
+}
+
+/// Whether a star has about the frame's spot size.
+fn has_size_of(maps: &FrameMaps<'_>, fit: &SpotFit) -> bool {
+    libm::log(fit.spot_px / maps.spot_px).abs() < libm::log(MODE_WIDTH)
 }
 
 /// The noise model with no more shot noise than cameras have.
