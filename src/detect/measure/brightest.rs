@@ -8,9 +8,7 @@ use crate::base::statistics::median;
 use crate::detect::candidates::{Peak, RawPeak, RawPeakFinder};
 use crate::detect::detection::{Detection, DetectionFlags};
 use crate::detect::filter::Kernel;
-use crate::detect::fit::{
-    BatchStart, FitBuffers, FitConfig, FrameMaps, NoiseModel, SpotEstimate, SpotFit,
-};
+use crate::detect::fit::{BatchStart, FitBuffers, FitConfig, FrameMaps, SpotEstimate, SpotFit};
 use crate::detect::star_model::{BrightPeak, MAX_STARS, rough_star_model};
 use arrayvec::ArrayVec;
 use std::mem;
@@ -22,9 +20,6 @@ const CELLS: usize = 6;
 /// … and the part of the stars that may be in one of them: of stars spread by chance over all of them, more are
 /// in one place in less than one frame of a hundred.
 const MOST_IN_CELL: f64 = 0.12;
-/// Relative error of the spot to begin with: its size is that of all stars, and it is not quite a Gaussian.
-const MODEL_ERROR: f64 = 0.05;
-
 /// The brightest stars; holds the buffers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BrightestStars {
@@ -83,14 +78,8 @@ impl BrightestStars {
             sources.extend(peaks.iter().filter_map(|peak| of_core(peak, maps)));
             return;
         }
-        let unsaturated = peaks.iter().enumerate().filter(|(_, peak)| !peak.saturated);
-        let bright = unsaturated.take(MAX_STARS);
-        let bright = bright.map(|(number, peak)| start_at(number, peak, maps));
-        let rough = NoiseModel {
-            shot_adu: 0.0,
-            model_error2: MODEL_ERROR * MODEL_ERROR,
-        };
-        let stars = rough_star_model(maps, bright, rough, fits);
+        let unsaturated = peaks.iter().filter(|peak| !peak.saturated);
+        let stars = rough_star_model(maps, unsaturated.map(|peak| peak.start(maps)), fits);
         maps.spot_px = stated_px.unwrap_or(stars.spot_px);
         maps.matched_gain = Kernel::for_spot(maps.spot_px).matched_gain();
         let maps = &*maps;
@@ -100,7 +89,11 @@ impl BrightestStars {
             noise: stars.noise,
         };
         let starts = peaks.iter().enumerate();
-        let starts = starts.map(|(number, peak)| start_at(number, peak, maps));
+        let starts = starts.map(|(number, peak)| BatchStart {
+            number,
+            spot: peak.start(maps),
+            spot_px: maps.spot_px,
+        });
         let mut batch = mem::take(&mut fits.batch);
         batch.fit(maps, starts, &config, |number, fit, _| {
             let peak = &peaks[number];
@@ -108,15 +101,6 @@ impl BrightestStars {
             sources.extend(of_fit.or_else(|| of_core(peak, maps)));
         });
         fits.batch = batch;
-    }
-}
-
-/// Where the fit of a peak starts.
-fn start_at(number: usize, peak: &RawPeak, maps: &FrameMaps<'_>) -> BatchStart {
-    BatchStart {
-        number,
-        spot: peak.start(maps),
-        spot_px: maps.spot_px,
     }
 }
 

@@ -9,7 +9,7 @@ use super::spot_size::{BrightStars, MAX_STARS, MODE_WIDTH, weighted_size};
 use crate::base::least_squares::solve_pair;
 use crate::detect::fit::{
     AnyLight, BatchStart, CholeskyFactor, FitBuffers, FitConfig, FrameMaps, NoiseModel, ONE_SPOT,
-    SpotEstimate, SpotFit, SpotLight, Window, WindowPixels, linearise, sum_of,
+    SpotEstimate, SpotFit, SpotGroup, SpotLight, Window, WindowPixels, linearise, sum_of,
 };
 use crate::detect::psf::GROUP_PX;
 use arrayvec::ArrayVec;
@@ -45,6 +45,16 @@ pub(crate) struct StarModel {
 /// with the weights that follow from it.
 pub(crate) fn star_model(
     maps: &FrameMaps<'_>,
+    stars: BrightStars,
+    buffers: &mut FitBuffers,
+) -> StarModel {
+    star_model_in(NOISE_ROUNDS, maps, stars, buffers)
+}
+
+/// [`star_model`] in so many rounds.
+fn star_model_in(
+    rounds: usize,
+    maps: &FrameMaps<'_>,
     mut stars: BrightStars,
     buffers: &mut FitBuffers,
 ) -> StarModel {
@@ -59,7 +69,7 @@ pub(crate) fn star_model(
     };
     let mut elongation = CommonElongation::new(maps.view.size());
     // Each round weights the squared residuals by the variance from the round before.
-    for round in 1..=NOISE_ROUNDS {
+    for round in 1..=rounds {
         let mut sums = NoiseSums::default();
         let config = FitConfig {
             spot_px: stars.iter().map(|s| s.spot_px).fold(0.0, f64::max),
@@ -77,7 +87,7 @@ pub(crate) fn star_model(
         batch.fit(maps, starts, &config, |i, fit, window| {
             if let Some(fit) = fit {
                 buffers.window.copy_from(window);
-                let is_last = round == NOISE_ROUNDS;
+                let is_last = round == rounds;
                 sums.add_star(buffers, &fit, &config, is_last.then_some(&mut elongation));
                 stars[i] = fit;
             }
@@ -92,36 +102,21 @@ pub(crate) fn star_model(
     }
 }
 
-/// Size and noise of the stars from one fit of each, which begin at `starts`, with a rough model of the noise: a round
-/// of [`star_model`].
+/// Size and noise of the stars that begin at `starts`, which are not fitted yet, in fewer rounds than
+/// [`star_model`] needs for the noise of the faintest.
 pub(crate) fn rough_star_model(
     maps: &FrameMaps<'_>,
-    starts: impl Iterator<Item = BatchStart>,
-    rough: NoiseModel,
+    starts: impl Iterator<Item = SpotEstimate>,
     buffers: &mut FitBuffers,
 ) -> StarModel {
-    let config = FitConfig {
+    const ROUNDS: usize = 2;
+    let unfitted = |start: SpotEstimate| SpotFit {
+        spots: SpotGroup::from_iter([start]),
         spot_px: maps.spot_px,
-        free_size: true,
-        noise: rough,
+        ..SpotFit::default()
     };
-    let mut sums = NoiseSums::default();
-    let mut stars = BrightStars::new();
-    let mut batch = mem::take(&mut buffers.batch);
-    batch.fit(maps, starts, &config, |_, fit, window| {
-        let Some(fit) = fit.filter(|fit| has_size_of(maps, fit)) else {
-            return;
-        };
-        buffers.window.copy_from(window);
-        sums.add_star(buffers, &fit, &config, None);
-        let _ = stars.try_push(fit);
-    });
-    buffers.batch = batch;
-    StarModel {
-        spot_px: weighted_size(stars.iter()).unwrap_or(maps.spot_px),
-        noise: believable(sums.solve(), maps),
-        is_non_gaussian: false,
-    }
+    let stars = starts.take(MAX_STARS).map(unfitted).collect();
+    star_model_in(ROUNDS, maps, stars, buffers)
 }
 
 /// Whether a star has about the frame's spot size.
