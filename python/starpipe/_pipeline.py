@@ -123,9 +123,7 @@ class Pipeline:
         solved = self._pipeline.solve(frame, stated, thread_count(threads), False)
         return _in_time(solved, frame)
 
-    def point(
-        self, image: ImageLike, mask: ArrayLike | None = None, **known: Any
-    ) -> Result:
+    def point(self, image: ImageLike, mask: ArrayLike | None = None, **known: Any) -> Result:
         """Find out where the camera points, from the brightest stars, and no more.
 
         Several times faster than `solve`: the faint stars are neither measured nor named.
