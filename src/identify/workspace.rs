@@ -276,7 +276,7 @@ pub(crate) enum Choices<'a> {
     AtOnce,
     /// The brightest stars of a field, and others of its stars.
     OfField,
-    /// The same, and the stars of the frame at lower resolutions.
+    /// The same, and the stars of the frame, detected otherwise.
     OfFrame(&'a dyn OtherFields),
 }
 
@@ -289,7 +289,7 @@ struct Others {
 }
 
 impl Others {
-    /// The frame at lower resolutions, deeper searches of it, parts of it, and fainter stars.
+    /// The frame's stars detected otherwise, deeper searches of it, parts of it, and fainter stars.
     fn choices<'w: 'a, 'a>(
         &'w mut self,
         whole: Problem<'a>,

@@ -12,7 +12,7 @@ use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{DetectError, Detections, detect_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
-use crate::identify::{Identification, Priors, ScalePrior};
+use crate::identify::{self, Identification, Priors, ScalePrior, SearchFailure, StarField};
 
 /// Attitude and optics of a frame from its brightest stars; `None` where they do not show beyond doubt where it
 /// points, and [`solve_frame`](super::solve_frame()) may find out. Nothing is allocated after the first frame of a
@@ -52,15 +52,23 @@ pub fn find_pointing_in<'w>(
     } = workspace;
     detect_brightest_into(frame, &config, POINTING_STARS, detect, detections)?;
     let field = fill_field(field, frame, detections, priors.places());
-    let lens = prepare(identify, &priors, context);
-    let Ok(found) = identify.attitude_at_once(field, &priors, context.indexed) else {
-        return Ok(None);
-    };
+    Ok(attitude_at_once(field, &priors, context, identify).ok())
+}
+
+/// Attitude and optics of `field`, with the errors that follow from what is not known.
+fn attitude_at_once<'w>(
+    field: &StarField,
+    priors: &Priors,
+    context: &Context,
+    workspace: &'w mut identify::Workspace,
+) -> Result<&'w Identification, SearchFailure> {
+    let lens = prepare(workspace, priors, context);
+    let found = workspace.attitude_at_once(field, priors, context.indexed)?;
     found.lens_is_known = lens.is_some();
     if priors.date.is_none() {
         found.add_unknown_aberration();
     }
-    Ok(Some(found))
+    Ok(found)
 }
 
 /// Searches the brightest stars, at once or not at all.
@@ -76,17 +84,10 @@ pub(super) fn search_at_once(
         identify, pointing, ..
     } = workspace;
     let field = fill_field(&mut pointing.field, frame, detections, places);
-    let lens = prepare(identify, priors, context);
-    let found = identify.attitude_at_once(field, priors, context.indexed);
+    let found = attitude_at_once(field, priors, context, identify);
     clock.lap(Stage::Pointing);
     let outcome = match found {
-        Ok(found) => {
-            found.lens_is_known = lens.is_some();
-            if priors.date.is_none() {
-                found.add_unknown_aberration();
-            }
-            Outcome::Identified(Box::new(found.clone()))
-        }
+        Ok(found) => Outcome::Identified(Box::new(found.clone())),
         Err(failure) => Outcome::NotIdentified(Reason::Search(failure)),
     };
     (outcome, None)

@@ -78,7 +78,7 @@ impl Solver {
         let camera = equipment.camera.clone();
         let mut context = Context::new(&self.indexed).with_options(&options, camera);
         context.measure_known_sky = true;
-        context.attitude_only = self.is_provisional;
+        context.attitude_only |= self.is_provisional;
         context.calibration = equipment.calibration.as_ref();
         context.on_stage = Some(&on_stage);
         let path = Path::new(name);
