@@ -29,9 +29,51 @@ pub fn detect_brightest_into(
     workspace: &mut Workspace,
     found: &mut Detections,
 ) -> Result<(), DetectError> {
+    look_for_brightest(frame, config, workspace)?;
+    measure_brightest_into(frame, config, count, workspace, found)
+}
+
+/// Looks at the pixels of `frame` once: the background, roughly, and what stands out of it.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub(crate) fn look_for_brightest(
+    frame: &Frame,
+    config: &DetectConfig,
+    workspace: &mut Workspace,
+) -> Result<(), DetectError> {
     error::check(frame, config)?;
-    found.clear();
     workspace.forget_visited_pixels();
+    let Workspace {
+        background,
+        search,
+        interrupt,
+        ..
+    } = workspace;
+    let view = View::of_live_pixels(frame).until(interrupt);
+    search.raw_peaks.peaks.clear();
+    if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
+        return Ok(());
+    }
+    background.measure_sparsely(&view, frame.step_adu, config.cell_px)?;
+    let saturation_adu = saturation_adu(frame, config);
+    Ok(search
+        .raw_peaks
+        .find(&view, &background.mesh, saturation_adu)?)
+}
+
+/// Measures up to `count` of the stars that [`look_for_brightest`] saw in the same frame last.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub(crate) fn measure_brightest_into(
+    frame: &Frame,
+    config: &DetectConfig,
+    count: usize,
+    workspace: &mut Workspace,
+    found: &mut Detections,
+) -> Result<(), DetectError> {
+    found.clear();
     let Workspace {
         background,
         search,
@@ -39,23 +81,12 @@ pub fn detect_brightest_into(
         interrupt,
         ..
     } = workspace;
-    let view = View::of_live_pixels(frame).until(interrupt);
-    if view.width < MIN_SIDE_PX || view.height < MIN_SIDE_PX {
-        return Ok(());
-    }
-    background.measure_sparsely(&view, frame.step_adu, config.cell_px)?;
-    let full_scale_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
-    let stated_adu = config
-        .saturation_adu
-        .map_or(f32::INFINITY, |adu| adu as f32);
-    let saturation_adu = full_scale_adu.min(stated_adu);
     let raw_peaks = &mut search.raw_peaks;
-    raw_peaks.find(&view, &background.mesh, saturation_adu)?;
     let mut maps = FrameMaps {
-        view,
+        view: View::of_live_pixels(frame).until(interrupt),
         background: &background.mesh,
         filtered: None,
-        saturation_adu,
+        saturation_adu: saturation_adu(frame, config),
         spot_px: 1.0,
         matched_gain: 1.0,
         psf: None,
@@ -65,13 +96,23 @@ pub fn detect_brightest_into(
     };
     maps.spot_px = config.spot_sigma_px.unwrap_or(spot_px);
     maps.matched_gain = Kernel::for_spot(maps.spot_px).matched_gain();
-    brightest.select(raw_peaks, &maps, count);
+    let is_enough = brightest.select(&raw_peaks.peaks, &maps, count);
+    if !is_enough && raw_peaks.find_rest(&maps.view, maps.background, maps.saturation_adu)? {
+        brightest.select(&raw_peaks.peaks, &maps, count);
+    }
     brightest.measure(&mut maps, config.spot_sigma_px, &mut found.sources);
     found.background_adu = background.median_adu;
     found.noise_adu = background.median_sigma_adu;
     found.spot_sigma_px = maps.spot_px;
     super::keep_brightest(found, config, false);
     Ok(())
+}
+
+/// The level of saturation, stated or of the format.
+fn saturation_adu(frame: &Frame, config: &DetectConfig) -> f32 {
+    let full_scale_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
+    let stated_adu = config.saturation_adu;
+    full_scale_adu.min(stated_adu.map_or(f32::INFINITY, |adu| adu as f32))
 }
 
 #[cfg(test)]

@@ -65,6 +65,7 @@ mod workspace;
 
 pub use background_map::BackgroundMap;
 pub use brightest::detect_brightest_into;
+pub(crate) use brightest::{look_for_brightest, measure_brightest_into};
 pub use config::{CentroidMethod, DetectConfig};
 pub use detection::{
     Detection, DetectionFlags, Detections, MeasuredPsf, NoiseTail, StarTrails, Wings,

@@ -128,11 +128,15 @@ pub(super) fn frame_from_integers<T: WholeNumber>(
         2 => grey(values.chunks_exact(2).map(|c| c[0]), full_scale),
         channels => {
             let colors = values.chunks_exact(channels);
-            let luminance = |c: &[T]| luminance([level(c[0]), level(c[1]), level(c[2])], full);
-            Pixels::F32(match budget.color_channel() {
-                None => colors.map(luminance).collect(),
-                Some(channel) => colors.map(|c| level(c[channel])).collect(),
-            })
+            let pixels: Vec<f32> = match (budget.color_channel(), channels) {
+                (None, 3) => luminances::<T, 3>(values, full),
+                (None, 4) => luminances::<T, 4>(values, full),
+                (None, _) => colors
+                    .map(|c| luminance([c[0], c[1], c[2]].map(level), full))
+                    .collect(),
+                (Some(channel), _) => colors.map(|c| level(c[channel])).collect(),
+            };
+            pixels.into()
         }
     };
     let step = if samples.channels <= 2 {
@@ -142,6 +146,16 @@ pub(super) fn frame_from_integers<T: WholeNumber>(
     };
     let frame = Frame::from_checked(width, height, pixels);
     Ok(frame.with_step(step, full_scale.into()))
+}
+
+/// The luminance of pixels of so many `CHANNELS`, of which the first three are colors.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
+fn luminances<T: WholeNumber, const CHANNELS: usize>(values: &[T], full: f32) -> Vec<f32> {
+    let colors = values.as_chunks::<CHANNELS>().0.iter();
+    let level = |v: T| -> f32 { v.into() as f32 };
+    colors
+        .map(|c| luminance([c[0], c[1], c[2]].map(level), full))
+        .collect()
 }
 
 /// Grey levels in the smallest samples that hold all of the format.
@@ -217,14 +231,15 @@ pub(super) fn frame_from_floats(
 }
 
 /// The luminance of one pixel; `full` if a channel is saturated.
-pub(crate) fn luminance(rgb: [f32; 3], full: f32) -> f32 {
-    if rgb.iter().any(|&channel| channel >= full) {
-        return full;
-    }
-    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
-        return rgb[0];
-    }
-    rgb.iter().zip(LUMINANCE_WEIGHTS).map(|(c, w)| c * w).sum()
+#[inline(always)]
+pub(crate) fn luminance([red, green, blue]: [f32; 3], full: f32) -> f32 {
+    // Without branches, so that several pixels go through a register at once.
+    let is_full = (red >= full) | (green >= full) | (blue >= full);
+    let is_grey = (red == green) & (green == blue);
+    let [of_red, of_green, of_blue] = LUMINANCE_WEIGHTS;
+    let weighted = red * of_red + green * of_green + blue * of_blue;
+    let unsaturated = if is_grey { red } else { weighted };
+    if is_full { full } else { unsaturated }
 }
 
 /// The largest power of two that divides all levels below full scale: 16 if twelve bits are stored

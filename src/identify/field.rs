@@ -100,13 +100,16 @@ impl StarField {
     }
 }
 
-/// The stars of the same frame, detected otherwise: the brightest alone, at lower resolutions.
+/// The stars of the same frame, detected otherwise, in pixels of the whole frame.
 pub trait OtherFields {
-    /// Number of ways.
-    fn count(&self) -> usize;
+    /// The brightest, as single pixels show them; `None` where there are none.
+    fn brightest(&self) -> Option<&StarField>;
 
-    /// The stars by one of them, in pixels of the whole frame; `None` where there are none.
-    fn field(&self, number: usize) -> Option<&StarField>;
+    /// Number of lower resolutions.
+    fn resolutions(&self) -> usize;
+
+    /// The stars at one of them; `None` where there are none.
+    fn at_resolution(&self, number: usize) -> Option<&StarField>;
 }
 
 #[cfg(test)]

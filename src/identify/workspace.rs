@@ -191,6 +191,11 @@ impl Workspace {
         pointed.attitude_mut()
     }
 
+    /// The last answer.
+    pub(crate) fn answer(&self) -> Option<&Identification> {
+        self.answer.as_ref()
+    }
+
     /// Finds out where the camera points, from the brightest stars of `field`, and no more.
     ///
     /// # Errors
@@ -229,23 +234,29 @@ impl Workspace {
             answer,
         } = self;
         let whole = Problem::new(field, sky);
-        let (first, other_fields) = match tried {
-            Choices::AtOnce => (SearchPlan::at_once(), None),
-            Choices::OfField => (SearchPlan::brightest(*effort), None),
-            Choices::OfFrame(other_fields) => (SearchPlan::quick(*effort), Some(other_fields)),
+        let first = match tried {
+            Choices::AtOnce => SearchPlan::at_once(),
+            Choices::OfField => SearchPlan::brightest(*effort),
+            Choices::OfFrame(_) => SearchPlan::quick(*effort),
         };
         let mut search = TriangleSearch::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
         let mut best_log10 = search.best_log10_false_alarm();
-        if found.is_none() && !matches!(tried, Choices::AtOnce) && !search.is_interrupted() {
-            for choice in others.choices(whole, other_fields, *effort) {
-                (search, found) = choice.search(search, whole, priors);
-                let log10 = search.best_log10_false_alarm();
-                best_log10 = [best_log10, log10].into_iter().flatten().reduce(f64::min);
-                if found.is_some() || search.is_interrupted() {
-                    break;
+        if found.is_none() && !search.is_interrupted() {
+            let further = Further { whole, priors };
+            let (next, of_others) = match tried {
+                Choices::AtOnce => further.search(search, others.middle(whole)),
+                Choices::OfField => further.search(search, others.choices(whole, None, *effort)),
+                Choices::OfFrame(frame) => {
+                    further.search(search, others.choices(whole, Some(frame), *effort))
                 }
-            }
+            };
+            search = next;
+            found = of_others.found;
+            best_log10 = [best_log10, of_others.best_log10]
+                .into_iter()
+                .flatten()
+                .reduce(f64::min);
         }
         let failure = if search.is_interrupted() {
             SearchFailure::Interrupted
@@ -286,55 +297,78 @@ struct Others {
     thinning: Thinning,
     tiers: Tiers,
     windows: Windows,
+    windows_of_brightest: Windows,
 }
 
 impl Others {
-    /// The frame's stars detected otherwise, deeper searches of it, parts of it, and fainter stars.
+    /// The middle of the frame, where an answer is wanted at once.
+    fn middle<'w: 'a, 'a>(
+        &'w mut self,
+        whole: Problem<'a>,
+    ) -> impl Iterator<Item = FurtherSearch<'a>> {
+        middle(self.windows.cut(whole.field), whole)
+    }
+
+    /// What is searched besides: what costs little first.
     fn choices<'w: 'a, 'a>(
         &'w mut self,
         whole: Problem<'a>,
         other_fields: Option<&'a dyn OtherFields>,
         effort: Effort,
     ) -> impl Iterator<Item = FurtherSearch<'a>> {
+        let Self {
+            thinning,
+            tiers,
+            windows,
+            windows_of_brightest,
+        } = self;
+        let windows = windows.cut(whole.field);
+        let of_middle = middle(windows, whole);
         let of = move |field| Problem { field, ..whole };
+        let brightest = other_fields.and_then(|other_fields| other_fields.brightest());
+        let of_brightest = brightest.map(|field| {
+            let of_middle = middle(windows_of_brightest.cut(field), of(field));
+            std::iter::once(FurtherSearch::new(of(field), SearchPlan::at_once())).chain(of_middle)
+        });
         let coarse = other_fields.into_iter().flat_map(move |other_fields| {
-            let fields =
-                (0..other_fields.count()).filter_map(move |number| other_fields.field(number));
+            let fields = (0..other_fields.resolutions())
+                .filter_map(move |number| other_fields.at_resolution(number));
             fields.map(move |field| FurtherSearch::new(of(field), SearchPlan::coarse(effort)))
         });
         let of_whole =
             other_fields.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
-        let windows = self.windows.cut(whole.field).iter().map(move |window| {
+        let windows = windows.iter().map(move |window| {
             let plan = if window.is_main {
                 SearchPlan::coarse(effort)
             } else {
                 SearchPlan::window(effort)
             };
-            FurtherSearch {
-                window: Some(window),
-                ..FurtherSearch::new(of(&window.field), plan)
-            }
+            FurtherSearch::of_window(window, whole, plan)
         });
-        let thinned = self.thinning.thin(whole.field);
+        let thinned = thinning.thin(whole.field);
         let other_stars = SearchPlan::other_stars(effort);
         let thinned = thinned.map(move |field| FurtherSearch::new(of(field), other_stars));
-        let tiers = self
-            .tiers
-            .below(whole.field, effort.tiers())
-            .iter()
-            .map(move |tier| {
-                let problem = Problem {
-                    brighter: tier.brighter,
-                    ..of(&tier.field)
-                };
-                FurtherSearch::new(problem, SearchPlan::tier(effort))
-            });
-        coarse
-            .chain(of_whole)
-            .chain(thinned)
-            .chain(windows)
-            .chain(tiers)
+        let tiers = tiers.below(whole.field, effort.tiers());
+        let tiers = tiers.iter().map(move |tier| {
+            let problem = Problem {
+                brighter: tier.brighter,
+                ..of(&tier.field)
+            };
+            FurtherSearch::new(problem, SearchPlan::tier(effort))
+        });
+        let at_low_cost = of_brightest.into_iter().flatten().chain(of_middle);
+        let of_stars = coarse.chain(of_whole).chain(thinned);
+        at_low_cost.chain(of_stars).chain(windows).chain(tiers)
     }
+}
+
+/// The windows in the middle of a frame, of which an answer is wanted at once.
+fn middle<'a>(
+    windows: &'a [SearchWindow],
+    whole: Problem<'a>,
+) -> impl Iterator<Item = FurtherSearch<'a>> {
+    let central = windows.iter().filter(|window| window.is_central);
+    central.map(move |window| FurtherSearch::of_window(window, whole, SearchPlan::at_once()))
 }
 
 /// What else is searched where the brightest stars of a field do not identify it.
@@ -354,20 +388,69 @@ impl<'a> FurtherSearch<'a> {
         }
     }
 
-    /// Searches it, after `search`, for the pointing of the `whole` frame.
+    fn of_window(window: &'a SearchWindow, whole: Problem<'a>, plan: SearchPlan) -> Self {
+        let problem = Problem {
+            field: &window.field,
+            ..whole
+        };
+        Self {
+            window: Some(window),
+            ..Self::new(problem, plan)
+        }
+    }
+}
+
+/// Searches for the pointing of a `whole` frame in choices of its stars.
+#[derive(Clone, Copy)]
+struct Further<'a, 'p> {
+    whole: Problem<'a>,
+    priors: &'p Priors,
+}
+
+/// What was found in some of them, and the lowest log10 of the false-alarm probabilities.
+#[derive(Default)]
+struct FoundFurther {
+    found: Option<FoundHypothesis>,
+    best_log10: Option<f64>,
+}
+
+impl<'a> Further<'a, '_> {
+    /// Searches `choices` one after the other, after `search`, until one shows it.
     fn search(
         &self,
+        mut search: TriangleSearch<'a>,
+        choices: impl Iterator<Item = FurtherSearch<'a>>,
+    ) -> (TriangleSearch<'a>, FoundFurther) {
+        let mut of_all = FoundFurther::default();
+        for choice in choices {
+            let found;
+            (search, found) = self.search_one(search, &choice);
+            let log10 = search.best_log10_false_alarm();
+            of_all.best_log10 = [of_all.best_log10, log10]
+                .into_iter()
+                .flatten()
+                .reduce(f64::min);
+            of_all.found = found;
+            if found.is_some() || search.is_interrupted() {
+                break;
+            }
+        }
+        (search, of_all)
+    }
+
+    fn search_one(
+        &self,
         search: TriangleSearch<'a>,
-        whole: Problem<'a>,
-        priors: &Priors,
+        choice: &FurtherSearch<'a>,
     ) -> (TriangleSearch<'a>, Option<FoundHypothesis>) {
-        let Some(window) = self.window else {
-            let mut search = search.again(self.problem, self.plan, priors);
+        let Self { whole, priors } = *self;
+        let Some(window) = choice.window else {
+            let mut search = search.again(choice.problem, choice.plan, priors);
             let found = search.run();
             return (search, found);
         };
         let of_window = window.priors(priors, whole.field.width_px);
-        let mut search = search.again(self.problem, self.plan, &of_window);
+        let mut search = search.again(choice.problem, choice.plan, &of_window);
         match search.run() {
             Some(found) => search.follow(window, &found, whole, priors),
             None => (search, None),
@@ -435,7 +518,7 @@ impl<'w> PointedField<'w, '_> {
         } = self;
         let searched = search.problem();
         let problem = Problem {
-            field: bright.select(searched.field, ATTITUDE_STARS),
+            field: bright.select(searched.field, ATTITUDE_STARS.max(found.stars)),
             ..searched
         };
         let of_few = NamingStart {

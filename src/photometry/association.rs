@@ -150,7 +150,6 @@ pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
                 around.undetected_light += light_of(fainter_mag) * response;
             }
         });
-        around.undetected_light -= faint_light.over_light_of(star);
         around
     };
     let camera = &frame.identification.camera;
@@ -160,14 +159,21 @@ pub(crate) fn associate(frame: &IdentifiedFrame, predicted: &[PredictedStar]) ->
         .filter(|(_, star)| camera.contains(&star.pixel));
     let stars = inside.map(|(index, star)| {
         let around = surroundings(index, star);
+        let is_clear = camera.nearly_contains(&star.pixel, -resolved_px)
+            && around.is_single
+            && frame.detections.shows_sky(&star.pixel);
+        // Of others it is not asked, and there are many.
+        let faint_light = if is_clear {
+            faint_light.over_light_of(star)
+        } else {
+            0.0
+        };
         FrameStar {
             star: star.star,
             v_mag: f64::from(star.v_mag),
             detection: detections[index],
-            is_clear: camera.nearly_contains(&star.pixel, -resolved_px)
-                && around.is_single
-                && frame.detections.shows_sky(&star.pixel),
-            neighbors_light: around.undetected_light,
+            is_clear,
+            neighbors_light: around.undetected_light - faint_light,
         }
     });
     let by_chance: f64 = matches.iter().map(|found| found.p_chance).sum();

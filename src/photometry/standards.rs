@@ -27,10 +27,13 @@ impl Standards {
         let detected = clear
             .iter()
             .filter_map(|star| detection(star).filter(|(_, found)| found.flux_adu > 0.0));
+        let camera = &frame.identification.camera;
+        // Where the field of an all-sky lens ends, in units of the distance of the corners.
+        let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
         Self {
             detected: detected.clone().count(),
             stars: detected
-                .filter_map(|(star, found)| standard_star(&star, found, frame, sky))
+                .filter_map(|(star, found)| standard_star(&star, found, frame, sky, edge_sq))
                 .collect(),
         }
     }
@@ -63,12 +66,14 @@ impl Standards {
     }
 }
 
-/// `star` with its measured magnitude, if it is fit for the zero point.
+/// `star` with its measured magnitude, if it is fit for the zero point. `edge_sq` is the distance from the
+/// centre where the field ends, over that of the corners, squared.
 fn standard_star(
     star: &FrameStar,
     detection: &Detection,
     frame: &IdentifiedFrame,
     sky: &IndexedCatalog,
+    edge_sq: f64,
 ) -> Option<StandardStar> {
     /// Largest light of undetected neighbors that is subtracted, or added, over the star's own.
     const MAX_NEIGHBORS_LIGHT: f64 = 0.1;
@@ -77,8 +82,6 @@ fn standard_star(
     let is_fit =
         is_alone && detection.flags.has_clean_flux() && known.flags.is_constant_and_single();
     let camera = &frame.identification.camera;
-    // Where the field of an all-sky lens ends, in units of the distance of the corners.
-    let edge_sq = (camera.field_radius_px() / camera.radius_px()).powi(2);
     let measured = MeasuredMagnitude::of(frame, star, detection);
     is_fit.then(|| StandardStar {
         v_mag: star.v_mag,

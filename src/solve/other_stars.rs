@@ -3,7 +3,7 @@
 //! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). There is less of it in a
 //! coarser frame; and it is wider than they are, so that in single pixels they may stand out.
 
-use super::pointing_buffers::POINTING_STARS;
+use super::pointing_buffers::STARS_OF_PARTS;
 use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
 use crate::detect::{self, DetectConfig, Detections, detect, detect_brightest_into};
@@ -21,9 +21,6 @@ const MAX_PX: usize = 1 << 20;
 /// Most detections: a search looks at the brightest.
 const MAX_DETECTIONS: usize = 1000;
 
-/// The number of choices: the coarser frames, then the brightest stars.
-const CHOICES: usize = FACTORS.len() + 1;
-
 /// A frame whose stars are detected otherwise, when a search asks for them.
 pub(super) struct OtherStars<'a> {
     frame: &'a Frame<'a>,
@@ -31,7 +28,8 @@ pub(super) struct OtherStars<'a> {
     /// frame is detected with buffers of its own.
     detector: &'a detect::Workspace,
     places: StarPlaces,
-    fields: [OnceCell<Option<StarField>>; CHOICES],
+    brightest: OnceCell<Option<StarField>>,
+    coarse: [OnceCell<Option<StarField>>; FACTORS.len()],
 }
 
 impl<'a> OtherStars<'a> {
@@ -40,12 +38,13 @@ impl<'a> OtherStars<'a> {
             frame,
             detector,
             places,
-            fields: Default::default(),
+            brightest: OnceCell::new(),
+            coarse: Default::default(),
         }
     }
 
     /// The stars that stand out in single pixels.
-    fn brightest(&self) -> Option<StarField> {
+    fn detect_brightest(&self) -> Option<StarField> {
         let Self {
             frame,
             detector,
@@ -57,7 +56,7 @@ impl<'a> OtherStars<'a> {
         detect_brightest_into(
             frame,
             &config,
-            POINTING_STARS,
+            STARS_OF_PARTS,
             &mut detector,
             &mut detections,
         )
@@ -105,17 +104,24 @@ impl<'a> OtherStars<'a> {
 }
 
 impl OtherFields for OtherStars<'_> {
-    fn count(&self) -> usize {
-        CHOICES
+    fn brightest(&self) -> Option<&StarField> {
+        if self.detector.is_interrupted() {
+            return None;
+        }
+        let brightest = self.brightest.get_or_init(|| self.detect_brightest());
+        brightest.as_ref()
     }
 
-    fn field(&self, number: usize) -> Option<&StarField> {
-        let detected = || match FACTORS.get(number) {
-            _ if self.detector.is_interrupted() => None,
-            Some(&factor) => self.detected(factor),
-            None => self.brightest(),
-        };
-        self.fields[number].get_or_init(detected).as_ref()
+    fn resolutions(&self) -> usize {
+        FACTORS.len()
+    }
+
+    fn at_resolution(&self, number: usize) -> Option<&StarField> {
+        if self.detector.is_interrupted() {
+            return None;
+        }
+        let coarse = self.coarse[number].get_or_init(|| self.detected(FACTORS[number]));
+        coarse.as_ref()
     }
 }
 
@@ -139,7 +145,7 @@ mod tests {
         let detector = detect::Workspace::new();
         let other_fields = OtherStars::new(&frame, &detector, StarPlaces::default());
         for number in 0..FACTORS.len() {
-            let field = other_fields.field(number).unwrap();
+            let field = other_fields.at_resolution(number).unwrap();
             assert_eq!((field.width_px, field.height_px), (320.0, 300.0));
             for [x, y] in stars {
                 let place = PixelPoint::new(x, y);
@@ -150,7 +156,7 @@ mod tests {
         let small = Frame::new(100, 400, vec![0.0; 40_000]).unwrap();
         assert!(
             OtherStars::new(&small, &detector, StarPlaces::default())
-                .field(0)
+                .at_resolution(0)
                 .is_none()
         );
     }

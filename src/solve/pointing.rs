@@ -6,10 +6,10 @@
 use super::context::{Context, Workspace};
 use super::identification::prepare;
 use super::outcome::{Outcome, Reason};
-use super::pointing_buffers::{POINTING_STARS, PointingBuffers};
+use super::pointing_buffers::{PointingBuffers, TRIED_STARS};
 use super::star_field::fill_field;
 use super::stopwatch::{Stage, Stopwatch};
-use crate::detect::{DetectError, Detections, detect_brightest_into};
+use crate::detect::{DetectError, Detections, look_for_brightest, measure_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{self, Identification, Priors, ScalePrior, SearchFailure, StarField};
@@ -50,9 +50,15 @@ pub fn find_pointing_in<'w>(
         pointing: PointingBuffers { detections, field },
         ..
     } = workspace;
-    detect_brightest_into(frame, &config, POINTING_STARS, detect, detections)?;
-    let field = fill_field(field, frame, detections, priors.places());
-    Ok(attitude_at_once(field, &priors, context, identify).ok())
+    look_for_brightest(frame, &config, detect)?;
+    for count in TRIED_STARS {
+        measure_brightest_into(frame, &config, count, detect, detections)?;
+        let field = fill_field(field, frame, detections, priors.places());
+        if attitude_at_once(field, &priors, context, identify).is_ok() {
+            return Ok(identify.answer());
+        }
+    }
+    Ok(None)
 }
 
 /// Attitude and optics of `field`, with the errors that follow from what is not known.

@@ -8,7 +8,7 @@ use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::place_time::{ConfirmedPlaceTime, PlaceTime, settle};
 use super::pointing::search_at_once;
-use super::pointing_buffers::POINTING_STARS;
+use super::pointing_buffers::TRIED_STARS;
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::Solution;
@@ -18,7 +18,9 @@ use super::star_field::star_field;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
 use crate::calibration::Calibration;
-use crate::detect::{self, DetectConfig, DetectError, Detections, Trail, detect_brightest_into};
+use crate::detect::{
+    self, DetectConfig, DetectError, Detections, Trail, look_for_brightest, measure_brightest_into,
+};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::{Priors, ScalePrior, SearchFailure};
@@ -387,33 +389,37 @@ impl StarSearch<'_, '_> {
         clock: &mut Stopwatch,
     ) -> Result<Option<FoundStars>, DetectError> {
         if self.context.attitude_only && !self.context.find_trails {
-            let pointed = self.point(config, clock)?;
-            if pointed.is_some() {
-                return Ok(pointed);
+            match self.point(config, clock) {
+                Ok(None) | Err(DetectError::Interrupted(_)) => {}
+                pointed => return pointed,
             }
         }
         self.run(config, clock)
     }
 
     /// The brightest stars, where they show beyond doubt where the camera points.
+    ///
+    /// # Errors
+    /// As [`detect`](detect::detect()).
     fn point(
         &mut self,
         config: &DetectConfig,
         clock: &mut Stopwatch,
     ) -> Result<Option<FoundStars>, DetectError> {
-        let mut detections = Detections::default();
         let frame = self.prepared.frame();
-        let detector = &mut self.workspace.detect;
-        let detected =
-            detect_brightest_into(frame, config, POINTING_STARS, detector, &mut detections);
+        look_for_brightest(frame, config, &mut self.workspace.detect)?;
         clock.lap(Stage::Detect);
-        if matches!(detected, Err(DetectError::Interrupted(_))) {
-            return Ok(None);
+        for count in TRIED_STARS {
+            let mut detections = Detections::default();
+            let detector = &mut self.workspace.detect;
+            measure_brightest_into(frame, config, count, detector, &mut detections)?;
+            clock.lap(Stage::Detect);
+            let stars = self.identify(detections, None, search_at_once, clock);
+            if stars.outcome.identification().is_some() {
+                return Ok(Some(stars));
+            }
         }
-        detected?;
-        let stars = self.identify(detections, None, search_at_once, clock);
-        let is_found = stars.outcome.identification().is_some();
-        Ok(is_found.then_some(stars))
+        Ok(None)
     }
 
     /// Identifies stars with `search`, as far as what is known of the frame holds.

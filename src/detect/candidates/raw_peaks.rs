@@ -75,6 +75,8 @@ pub(crate) struct RawPeakFinder {
     pub peaks: Vec<RawPeak>,
     /// Pixels that were looked at since this was set to 0.
     pub visited_px: usize,
+    /// Rounds over the frame that are done.
+    done: usize,
     /// One for each thread.
     workers: Vec<BandWorker>,
 }
@@ -103,16 +105,44 @@ impl RawPeakFinder {
         background: &Mesh,
         saturation_adu: f32,
     ) -> Result<(), Interrupted> {
+        self.peaks.clear();
+        self.done = 0;
+        self.find_until(MAX_PEAKS, view, background, saturation_adu)
+    }
+
+    /// Finds those in the part of the same view that was not looked at. Returns whether there is such a part.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn find_rest(
+        &mut self,
+        view: &View<'_>,
+        background: &Mesh,
+        saturation_adu: f32,
+    ) -> Result<bool, Interrupted> {
+        let is_there_more = self.done < rounds_of(view);
+        self.find_until(usize::MAX, view, background, saturation_adu)?;
+        Ok(is_there_more)
+    }
+
+    /// Looks on until there are so many.
+    fn find_until(
+        &mut self,
+        enough: usize,
+        view: &View<'_>,
+        background: &Mesh,
+        saturation_adu: f32,
+    ) -> Result<(), Interrupted> {
         let Self {
             peaks,
             visited_px,
+            done,
             workers,
         } = self;
-        peaks.clear();
         let bands = view.height.div_ceil(BAND_PX);
-        let rounds = (view.width * view.height / ROUND_PX).max(1);
+        let rounds = rounds_of(view);
         let threads = workers.len();
-        for round in 0..rounds {
+        for round in *done..rounds {
             for_each_worker(workers, &|worker, thread| {
                 let of_thread = (round..bands).step_by(rounds).skip(thread);
                 worker.found.clear();
@@ -128,13 +158,19 @@ impl RawPeakFinder {
             for worker in workers.iter_mut() {
                 peaks.append(&mut worker.found);
             }
-            if peaks.len() >= MAX_PEAKS {
+            *done = round + 1;
+            if peaks.len() >= enough {
                 break;
             }
         }
         peaks.sort_unstable_by(|a, b| b.snr.total_cmp(&a.snr).then((a.y, a.x).cmp(&(b.y, b.x))));
         Ok(())
     }
+}
+
+/// The rounds in which a view is looked at, all over it in each.
+fn rounds_of(view: &View<'_>) -> usize {
+    (view.width * view.height / ROUND_PX).max(1)
 }
 
 impl BandWorker {

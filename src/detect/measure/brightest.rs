@@ -44,22 +44,24 @@ fn is_of_light(peak: &RawPeak, maps: &FrameMaps<'_>) -> bool {
 }
 
 impl BrightestStars {
-    /// Selects the brightest peaks, but no more in one place than chance explains.
-    pub fn select(&mut self, raw_peaks: &RawPeakFinder, maps: &FrameMaps<'_>, count: usize) {
+    /// Selects the brightest peaks, but no more in one place than chance explains; returns whether there are so
+    /// many of them.
+    pub fn select(&mut self, peaks: &[RawPeak], maps: &FrameMaps<'_>, count: usize) -> bool {
         let chosen = &mut self.peaks;
         chosen.clear();
         let most = ((MOST_IN_CELL * count as f64).ceil() as usize).max(2);
         let mut in_cell = [0; CELLS * CELLS];
-        for peak in &raw_peaks.peaks {
+        for peak in peaks {
             let cell = &mut in_cell[cell_of(peak, maps.view.size())];
             if *cell < most && is_of_light(peak, maps) && !is_of_halo(peak, chosen, maps) {
                 *cell += 1;
                 chosen.push(*peak);
             }
             if chosen.len() == count {
-                break;
+                return true;
             }
         }
+        false
     }
 
     /// Measures them, and the size of their spots where it is not stated.

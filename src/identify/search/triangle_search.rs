@@ -619,7 +619,7 @@ impl<'a> TriangleSearch<'a> {
     /// do not show it, those below brighter detections may.
     fn log10_of_agreement(&mut self, field: &StarField, hypothesis: &Hypothesis) -> Option<f64> {
         /// Searches of other choices of stars and of windows, before those of the tiers.
-        const BEFORE_TIERS: u32 = 15;
+        const BEFORE_TIERS: u32 = 22;
         let log10 = self.log10_with(hypothesis, TESTED_STARS)?;
         if log10 <= LOG10_FALSE_ALARM_LIMIT {
             return Some(log10);

@@ -36,7 +36,7 @@ pub struct SearchWindow {
     /// Its first pixel in the frame.
     corner: PixelPoint,
     /// Whether it is in the middle of the frame.
-    is_central: bool,
+    pub is_central: bool,
     /// Whether it is worth a long search: in the middle, and not the smallest.
     pub is_main: bool,
 }
