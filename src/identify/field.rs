@@ -102,8 +102,9 @@ impl StarField {
 
 /// The stars of the same frame, detected otherwise, in pixels of the whole frame.
 pub trait OtherFields {
-    /// The brightest, as single pixels show them; `None` where there are none.
-    fn brightest(&self) -> Option<&StarField>;
+    /// The brightest, as single pixels show them: few of them, and so many that parts of the frame have enough;
+    /// `None` where there are none.
+    fn brightest(&self) -> Option<[&StarField; 2]>;
 
     /// Number of lower resolutions.
     fn resolutions(&self) -> usize;

@@ -173,7 +173,7 @@ impl Workspace {
         self.find_pointing(field, priors, sky)?.attitude()
     }
 
-    /// [`attitude`](Self::attitude), where the first triangles of the brightest stars show it beyond doubt: what is
+    /// [`attitude`](Self::attitude), where few triangles show it beyond doubt, those that are `tried` at once: what is
     /// searched after this adds its whole false-alarm probability, and this next to nothing.
     ///
     /// # Errors
@@ -183,8 +183,9 @@ impl Workspace {
         field: &StarField,
         priors: &Priors,
         sky: &IndexedCatalog,
+        tried: Choices,
     ) -> Result<&mut Identification, SearchFailure> {
-        let pointed = self.find_pointing_by(Choices::AtOnce, field, priors, sky)?;
+        let pointed = self.find_pointing_by(tried, field, priors, sky)?;
         if pointed.found.log10_false_alarm > LOG10_SURE {
             return Err(pointed.failure);
         }
@@ -236,8 +237,8 @@ impl Workspace {
         let whole = Problem::new(field, sky);
         let first = match tried {
             Choices::AtOnce => SearchPlan::at_once(),
-            Choices::OfField => SearchPlan::brightest(*effort),
-            Choices::OfFrame(_) => SearchPlan::quick(*effort),
+            Choices::PartsAtOnce => SearchPlan::NOTHING,
+            Choices::OfField | Choices::OfFrame(_) => SearchPlan::quick(*effort),
         };
         let mut search = TriangleSearch::new(whole, first, priors, *effort, buffers);
         let mut found = search.run();
@@ -245,7 +246,9 @@ impl Workspace {
         if found.is_none() && !search.is_interrupted() {
             let further = Further { whole, priors };
             let (next, of_others) = match tried {
-                Choices::AtOnce => further.search(search, others.middle(whole)),
+                Choices::AtOnce | Choices::PartsAtOnce => {
+                    further.search(search, others.middle(whole))
+                }
                 Choices::OfField => further.search(search, others.choices(whole, None, *effort)),
                 Choices::OfFrame(frame) => {
                     further.search(search, others.choices(whole, Some(frame), *effort))
@@ -283,8 +286,10 @@ impl Workspace {
 /// What is searched, one after the other.
 #[derive(Clone, Copy)]
 pub(crate) enum Choices<'a> {
-    /// Few triangles of the brightest stars of a field.
+    /// Few triangles of the brightest stars of a field, and of its middle.
     AtOnce,
+    /// The middle of a field alone.
+    PartsAtOnce,
     /// The brightest stars of a field, and others of its stars.
     OfField,
     /// The same, and the stars of the frame, detected otherwise.
@@ -326,17 +331,17 @@ impl Others {
         let of_middle = middle(windows, whole);
         let of = move |field| Problem { field, ..whole };
         let brightest = other_fields.and_then(|other_fields| other_fields.brightest());
-        let of_brightest = brightest.map(|field| {
-            let of_middle = middle(windows_of_brightest.cut(field), of(field));
-            std::iter::once(FurtherSearch::new(of(field), SearchPlan::at_once())).chain(of_middle)
+        let of_brightest = brightest.map(|[few, many]| {
+            let of_few = FurtherSearch::new(of(few), SearchPlan::at_once());
+            let of_middle = middle(windows_of_brightest.cut(many), of(many));
+            std::iter::once(of_few).chain(of_middle)
         });
         let coarse = other_fields.into_iter().flat_map(move |other_fields| {
             let fields = (0..other_fields.resolutions())
                 .filter_map(move |number| other_fields.at_resolution(number));
             fields.map(move |field| FurtherSearch::new(of(field), SearchPlan::coarse(effort)))
         });
-        let of_whole =
-            other_fields.map(move |_| FurtherSearch::new(whole, SearchPlan::votes(effort)));
+        let of_whole = std::iter::once(FurtherSearch::new(whole, SearchPlan::votes(effort)));
         let windows = windows.iter().map(move |window| {
             let plan = if window.is_main {
                 SearchPlan::coarse(effort)

@@ -3,10 +3,12 @@
 //! Structure swamps the stars (city lights, foliage, nebulae, noise of compression). There is less of it in a
 //! coarser frame; and it is wider than they are, so that in single pixels they may stand out.
 
-use super::pointing_buffers::STARS_OF_PARTS;
+use super::pointing_buffers::TRIED_STARS;
 use super::star_field::star_field;
 use crate::base::coords::PixelPoint;
-use crate::detect::{self, DetectConfig, Detections, detect, detect_brightest_into};
+use crate::detect::{
+    self, DetectConfig, Detections, detect, look_for_brightest, measure_brightest_into,
+};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{ObservedStar, OtherFields, StarField};
@@ -28,7 +30,7 @@ pub(super) struct OtherStars<'a> {
     /// frame is detected with buffers of its own.
     detector: &'a detect::Workspace,
     places: StarPlaces,
-    brightest: OnceCell<Option<StarField>>,
+    brightest: OnceCell<Option<[StarField; 2]>>,
     coarse: [OnceCell<Option<StarField>>; FACTORS.len()],
 }
 
@@ -44,24 +46,22 @@ impl<'a> OtherStars<'a> {
     }
 
     /// The stars that stand out in single pixels.
-    fn detect_brightest(&self) -> Option<StarField> {
+    fn detect_brightest(&self) -> Option<[StarField; 2]> {
         let Self {
             frame,
             detector,
             places,
             ..
         } = self;
-        let (config, mut detections) = (DetectConfig::default(), Detections::default());
-        let mut detector = detector.emptied();
-        detect_brightest_into(
-            frame,
-            &config,
-            STARS_OF_PARTS,
-            &mut detector,
-            &mut detections,
-        )
-        .ok()?;
-        Some(star_field(frame, &detections, *places))
+        let (config, mut detector) = (DetectConfig::default(), detector.emptied());
+        look_for_brightest(frame, &config, &mut detector).ok()?;
+        let mut field_of = |count| {
+            let mut stars = Detections::default();
+            measure_brightest_into(frame, &config, count, &mut detector, &mut stars).ok()?;
+            Some(star_field(frame, &stars, *places))
+        };
+        let [few, many] = TRIED_STARS;
+        Some([field_of(few)?, field_of(many)?])
     }
 
     /// The stars of the frame in blocks of `factor` × `factor` pixels, in pixels of the whole frame.
@@ -104,12 +104,12 @@ impl<'a> OtherStars<'a> {
 }
 
 impl OtherFields for OtherStars<'_> {
-    fn brightest(&self) -> Option<&StarField> {
+    fn brightest(&self) -> Option<[&StarField; 2]> {
         if self.detector.is_interrupted() {
             return None;
         }
         let brightest = self.brightest.get_or_init(|| self.detect_brightest());
-        brightest.as_ref()
+        brightest.as_ref().map(|fields| fields.each_ref())
     }
 
     fn resolutions(&self) -> usize {

@@ -6,13 +6,15 @@
 use super::context::{Context, Workspace};
 use super::identification::prepare;
 use super::outcome::{Outcome, Reason};
-use super::pointing_buffers::{PointingBuffers, TRIED_STARS};
+use super::pointing_buffers::{PointingBuffers, TRIED_CHOICES, TRIED_STARS};
 use super::star_field::fill_field;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::detect::{DetectError, Detections, look_for_brightest, measure_brightest_into};
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
-use crate::identify::{self, Identification, Priors, ScalePrior, SearchFailure, StarField};
+use crate::identify::{
+    self, Choices, Identification, Priors, ScalePrior, SearchFailure, StarField,
+};
 
 /// Attitude and optics of a frame from its brightest stars; `None` where they do not show beyond doubt where it
 /// points, and [`solve_frame`](super::solve_frame()) may find out. Nothing is allocated after the first frame of a
@@ -51,25 +53,25 @@ pub fn find_pointing_in<'w>(
         ..
     } = workspace;
     look_for_brightest(frame, &config, detect)?;
-    for count in TRIED_STARS {
+    for (count, tried) in TRIED_STARS.into_iter().zip(TRIED_CHOICES) {
         measure_brightest_into(frame, &config, count, detect, detections)?;
         let field = fill_field(field, frame, detections, priors.places());
-        if attitude_at_once(field, &priors, context, identify).is_ok() {
+        if attitude_at_once((field, tried), &priors, context, identify).is_ok() {
             return Ok(identify.answer());
         }
     }
     Ok(None)
 }
 
-/// Attitude and optics of `field`, with the errors that follow from what is not known.
+/// Attitude and optics of `field` by what is `tried` of it, with the errors that follow from what is not known.
 fn attitude_at_once<'w>(
-    field: &StarField,
+    (field, tried): (&StarField, Choices),
     priors: &Priors,
     context: &Context,
     workspace: &'w mut identify::Workspace,
 ) -> Result<&'w Identification, SearchFailure> {
     let lens = prepare(workspace, priors, context);
-    let found = workspace.attitude_at_once(field, priors, context.indexed)?;
+    let found = workspace.attitude_at_once(field, priors, context.indexed, tried)?;
     found.lens_is_known = lens.is_some();
     if priors.date.is_none() {
         found.add_unknown_aberration();
@@ -80,7 +82,7 @@ fn attitude_at_once<'w>(
 /// Searches the brightest stars, at once or not at all.
 pub(super) fn search_at_once(
     frame: &Frame,
-    detections: &Detections,
+    (detections, tried): (&Detections, Choices),
     (priors, places): (&Priors, StarPlaces),
     context: &Context,
     workspace: &mut Workspace,
@@ -90,7 +92,7 @@ pub(super) fn search_at_once(
         identify, pointing, ..
     } = workspace;
     let field = fill_field(&mut pointing.field, frame, detections, places);
-    let found = attitude_at_once(field, priors, context, identify);
+    let found = attitude_at_once((field, tried), priors, context, identify);
     clock.lap(Stage::Pointing);
     let outcome = match found {
         Ok(found) => Outcome::Identified(Box::new(found.clone())),

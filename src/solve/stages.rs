@@ -8,7 +8,7 @@ use super::note::Note;
 use super::outcome::{Outcome, Reason};
 use super::place_time::{ConfirmedPlaceTime, PlaceTime, settle};
 use super::pointing::search_at_once;
-use super::pointing_buffers::TRIED_STARS;
+use super::pointing_buffers::{TRIED_CHOICES, TRIED_STARS};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
 use super::solution::Solution;
@@ -23,7 +23,7 @@ use crate::detect::{
 };
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
-use crate::identify::{Priors, ScalePrior, SearchFailure};
+use crate::identify::{Choices, Priors, ScalePrior, SearchFailure};
 use crate::photometry::PictureColors;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -300,16 +300,6 @@ struct StarSearch<'a, 'c> {
     workspace: &'a mut Workspace,
 }
 
-/// Identifies the stars of a frame. Also returns the scale that was dropped because nothing matched with it.
-type Search = fn(
-    &Frame,
-    &Detections,
-    (&Priors, StarPlaces),
-    &Context,
-    &mut Workspace,
-    &mut Stopwatch,
-) -> (Outcome, Option<ScalePrior>);
-
 /// The stars of a frame, and which they are.
 struct FoundStars {
     detections: Detections,
@@ -364,7 +354,7 @@ impl StarSearch<'_, '_> {
         let Some((detections, mosaic)) = self.detect(config, clock)? else {
             return Ok(None);
         };
-        let mut stars = self.identify(detections, mosaic, identify_stars, clock);
+        let mut stars = self.identify(detections, mosaic, None, clock);
         let held = self.context.fixed_camera.as_ref();
         if stars.outcome.identification().is_none()
             && let Some(spot_sigma_px) = held.and_then(|held| held.spot_sigma_px)
@@ -409,12 +399,12 @@ impl StarSearch<'_, '_> {
         let frame = self.prepared.frame();
         look_for_brightest(frame, config, &mut self.workspace.detect)?;
         clock.lap(Stage::Detect);
-        for count in TRIED_STARS {
+        for (count, tried) in TRIED_STARS.into_iter().zip(TRIED_CHOICES) {
             let mut detections = Detections::default();
             let detector = &mut self.workspace.detect;
             measure_brightest_into(frame, config, count, detector, &mut detections)?;
             clock.lap(Stage::Detect);
-            let stars = self.identify(detections, None, search_at_once, clock);
+            let stars = self.identify(detections, None, Some(tried), clock);
             if stars.outcome.identification().is_some() {
                 return Ok(Some(stars));
             }
@@ -422,12 +412,12 @@ impl StarSearch<'_, '_> {
         Ok(None)
     }
 
-    /// Identifies stars with `search`, as far as what is known of the frame holds.
+    /// Identifies stars, as far as what is known of the frame holds; only what is tried `at_once`, if that is stated.
     fn identify(
         &mut self,
         detections: Detections,
         mosaic: Option<RawColor>,
-        search: Search,
+        at_once: Option<Choices>,
         clock: &mut Stopwatch,
     ) -> FoundStars {
         let frame = self.prepared.frame();
@@ -439,8 +429,14 @@ impl StarSearch<'_, '_> {
             let mut outcome = None;
             for priors in near.iter().chain([priors]) {
                 let known = (priors, places);
-                let (found, dropped) =
-                    search(frame, &detections, known, context, self.workspace, clock);
+                let workspace = &mut *self.workspace;
+                let (found, dropped) = match at_once {
+                    Some(tried) => {
+                        let stars = (&detections, tried);
+                        search_at_once(frame, stars, known, context, workspace, clock)
+                    }
+                    None => identify_stars(frame, &detections, known, context, workspace, clock),
+                };
                 dropped_scale = dropped;
                 let is_identified = found.identification().is_some();
                 outcome = Some(found);

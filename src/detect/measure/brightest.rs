@@ -15,11 +15,13 @@ use std::mem;
 
 /// Fewer stars do not tell a pointing that is sure.
 const MIN_STARS: usize = 8;
-/// Places along each side of the frame, …
-const CELLS: usize = 6;
-/// … and the part of the stars that may be in one of them: of stars spread by chance over all of them, more are
-/// in one place in less than one frame of a hundred.
-const MOST_IN_CELL: f64 = 0.12;
+/// Places along each side of the frame, over the root of the number of stars, the most of these places, …
+const CELLS: f64 = 0.6;
+const MAX_CELLS: usize = 32;
+/// … and the stars that may be in one of them: of stars spread by chance over all of them, more are in one place in
+/// less than one frame of a hundred.
+const MOST_IN_CELL: u8 = 12;
+
 /// The brightest stars; holds the buffers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BrightestStars {
@@ -49,11 +51,12 @@ impl BrightestStars {
     pub fn select(&mut self, peaks: &[RawPeak], maps: &FrameMaps<'_>, count: usize) -> bool {
         let chosen = &mut self.peaks;
         chosen.clear();
-        let most = ((MOST_IN_CELL * count as f64).ceil() as usize).max(2);
-        let mut in_cell = [0; CELLS * CELLS];
+        let cells = (CELLS * (count as f64).sqrt()).round() as usize;
+        let cells = cells.clamp(1, MAX_CELLS);
+        let mut in_cell = [0_u8; MAX_CELLS * MAX_CELLS];
         for peak in peaks {
-            let cell = &mut in_cell[cell_of(peak, maps.view.size())];
-            if *cell < most && is_of_light(peak, maps) && !is_of_halo(peak, chosen, maps) {
+            let cell = &mut in_cell[cell_of(peak, maps.view.size(), cells)];
+            if *cell < MOST_IN_CELL && is_of_light(peak, maps) && !is_of_halo(peak, chosen, maps) {
                 *cell += 1;
                 chosen.push(*peak);
             }
@@ -176,9 +179,9 @@ fn detection(maps: &FrameMaps<'_>, spot: &SpotEstimate, excess: f64) -> Detectio
     }
 }
 
-/// The number of the place that a peak is in.
-fn cell_of(peak: &RawPeak, size: Size) -> usize {
-    peak.y * CELLS / size.height * CELLS + peak.x * CELLS / size.width
+/// The number of the place that a peak is in, of so many along each side.
+fn cell_of(peak: &RawPeak, size: Size, cells: usize) -> usize {
+    peak.y * cells / size.height * cells + peak.x * cells / size.width
 }
 
 /// Whether a peak is of the light around one of the brighter ones.

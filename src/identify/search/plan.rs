@@ -51,19 +51,21 @@ pub struct SearchPlan {
 }
 
 impl SearchPlan {
-    /// The plan for the brightest stars of the frame.
-    pub const fn brightest(effort: Effort) -> Self {
-        Self {
-            passes: &PASSES,
-            ..Self::votes(effort)
-        }
-    }
+    /// Nothing: others follow.
+    pub const NOTHING: Self = Self {
+        passes: &[],
+        votes: &[],
+        max_tested: 0,
+        max_work: 0,
+        max_fitted: 0,
+    };
 
-    /// The plan for the brightest stars of the frame where others follow: none of them votes.
+    /// The plan for the brightest stars of the frame, before others: none of them votes.
     pub const fn quick(effort: Effort) -> Self {
         Self {
+            passes: &PASSES,
             votes: &[],
-            ..Self::brightest(effort)
+            ..Self::votes(effort)
         }
     }
 
