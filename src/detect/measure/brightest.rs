@@ -120,8 +120,6 @@ fn shape_of(peaks: &[RawPeak], maps: &FrameMaps<'_>) -> StarShape {
 
 /// The star of a fit; `None` where its place is not that of the peak, or not known.
 fn of_fit(fit: &SpotFit, peak: &RawPeak, maps: &FrameMaps<'_>) -> Option<Detection> {
-    /// A spot is wider than the stars from this ratio of the sizes on.
-    const WIDE: f64 = 1.6;
     /// Chi² above what is expected is chance below this many of its standard deviations.
     const CHANCE_SIGMAS: f64 = 3.0;
     let spot = fit.spots[0];
@@ -133,14 +131,7 @@ fn of_fit(fit: &SpotFit, peak: &RawPeak, maps: &FrameMaps<'_>) -> Option<Detecti
     let by_chance = 1.0 + CHANCE_SIGMAS * (2.0 / freedom).sqrt();
     let excess = fit.chi2 / freedom;
     let excess = if excess > by_chance { excess } else { 1.0 };
-    let star = detection(maps, &spot, excess.sqrt());
-    Some(Detection {
-        flags: DetectionFlags {
-            extended: peak.size_in(&maps.view) > WIDE * maps.spot_px,
-            ..star.flags
-        },
-        ..star
-    })
+    Some(detection(maps, peak, &spot, excess.sqrt()))
 }
 
 /// The star of the light above half of the height, as where it is saturated.
@@ -155,18 +146,13 @@ fn of_core(peak: &RawPeak, maps: &FrameMaps<'_>) -> Option<Detection> {
         noise_flux: peak.flux_adu / f64::from(peak.snr),
         ..SpotEstimate::default()
     };
-    let star = detection(maps, &spot, 1.0);
-    Some(Detection {
-        flags: DetectionFlags {
-            saturated: peak.saturated,
-            ..star.flags
-        },
-        ..star
-    })
+    Some(detection(maps, peak, &spot, 1.0))
 }
 
-/// The detection of a spot, with its errors times `excess`, in coordinates of the frame.
-fn detection(maps: &FrameMaps<'_>, spot: &SpotEstimate, excess: f64) -> Detection {
+/// The detection of a spot at `peak`, with its errors times `excess`, in coordinates of the frame.
+fn detection(maps: &FrameMaps<'_>, peak: &RawPeak, spot: &SpotEstimate, excess: f64) -> Detection {
+    /// A spot is wider than the stars from this ratio of the sizes on.
+    const WIDE: f64 = 1.6;
     let view = &maps.view;
     Detection {
         position: PixelPoint::new(spot.x + view.x0 as f64, spot.y + view.y0 as f64),
@@ -175,7 +161,11 @@ fn detection(maps: &FrameMaps<'_>, spot: &SpotEstimate, excess: f64) -> Detectio
         flux_adu: spot.flux,
         peak_adu: 0.0,
         snr: spot.flux / spot.noise_flux,
-        flags: DetectionFlags::default(),
+        flags: DetectionFlags {
+            saturated: peak.saturated,
+            extended: !peak.saturated && peak.size_in(view) > WIDE * maps.spot_px,
+            ..DetectionFlags::default()
+        },
     }
 }
 
