@@ -74,6 +74,7 @@ pub(crate) fn measure_brightest_into(
     found: &mut Detections,
 ) -> Result<(), DetectError> {
     found.clear();
+    found.are_brightest = true;
     let Workspace {
         background,
         search,

@@ -103,6 +103,9 @@ pub struct Detections {
     /// Whether fainter sources were left out, since there are more than
     /// [`DetectConfig::max_detections`](super::DetectConfig::max_detections).
     pub is_truncated: bool,
+    /// Whether only the brightest were looked for, in single pixels
+    /// ([`detect_brightest_into`](super::detect_brightest_into)).
+    pub are_brightest: bool,
     /// How bright a star must be to be detected, by place.
     pub(crate) flux_limits: FluxLimits,
     /// The part of the frame that shows the sky; `None` where all of it does, or where it was not looked

@@ -136,6 +136,8 @@ pub enum Note {
     BrightDetectionsNotNamed(Vec<[f64; 2]>),
     /// Attitude and optics alone were wanted: the names are those of the brightest stars.
     AttitudeOnly,
+    /// The brightest stars told the pointing, and the others were not measured.
+    PointingAtOnce,
     /// The sky was to be measured, and too few stars tell the clear sky.
     SkyNotMeasured,
     /// The residuals are larger than the centroid errors.
@@ -186,6 +188,7 @@ impl Note {
             Self::BrightStarsNotNamed(_) => "bright_stars_not_named",
             Self::BrightDetectionsNotNamed(_) => "bright_detections_not_named",
             Self::AttitudeOnly => "attitude_only",
+            Self::PointingAtOnce => "pointing_at_once",
             Self::SkyNotMeasured => "sky_not_measured",
             Self::LargeResiduals { .. } => "large_residuals",
         }
@@ -211,6 +214,9 @@ impl Note {
             Self::AttitudeOnly => {
                 "attitude and optics are from the brightest stars; no other star was looked up, and no \
                  magnitude was measured"
+            }
+            Self::PointingAtOnce => {
+                "the brightest stars told where the camera points; the others were not measured"
             }
             Self::SkyNotMeasured => {
                 "the sky was not measured: too few stars are bright enough to tell how clear it is"
@@ -425,6 +431,7 @@ impl fmt::Display for Note {
             | Self::ZoneAssumed
             | Self::NoExposure
             | Self::AttitudeOnly
+            | Self::PointingAtOnce
             | Self::SkyNotMeasured => f.write_str(self.fixed_text().unwrap_or_default()),
             Self::IgnoredHeader(value) => value.fmt(f),
             Self::LargestImage(choice) => choice.fmt(f),

@@ -287,6 +287,11 @@ impl SolvedFrame<'_> {
             .chain(Note::of_pointing(!is_named, outcome))
             .chain(self.notes_of_bright_stars())
             .chain(Note::of_date(priors, outcome))
+            .chain(
+                self.detections
+                    .are_brightest
+                    .then_some(Note::PointingAtOnce),
+            )
             .chain(self.is_sky_missing().then_some(Note::SkyNotMeasured))
             .collect()
     }

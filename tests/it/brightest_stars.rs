@@ -66,7 +66,9 @@ fn only_the_brightest_stars_are_named_and_no_magnitude_is_measured() {
         assert!(bright[absent].is_null(), "{absent}");
     }
     let notes = bright["notes"].as_array().unwrap();
-    assert!(notes.iter().any(|note| note["code"] == "attitude_only"));
+    for code in ["attitude_only", "pointing_at_once"] {
+        assert!(notes.iter().any(|note| note["code"] == code), "{code}");
+    }
 }
 
 #[test]
