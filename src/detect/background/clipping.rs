@@ -87,43 +87,88 @@ pub(crate) fn clipped(
 /// Number, sum and sum of squares of `sample - center` where it is at most `half_width` in size.
 #[inline(always)]
 fn clipped_moments(samples: &CellSamples<'_>, center: f32, half_width: f32) -> [f32; 3] {
-    let mut count = [0u32; LANES];
-    let [mut sum, mut squares] = [[0.0f32; LANES]; 2];
-    let mut add = |lane: usize, value: f32| {
-        let deviation = value - center;
-        let inside = deviation.abs() <= half_width;
-        let kept = if inside { deviation } else { 0.0 };
-        count[lane] += u32::from(inside);
-        sum[lane] += kept;
-        squares[lane] += kept * kept;
-    };
+    let clip = Clip { center, half_width };
+    let mut sums = ClippedSums::default();
     let CellSamples { rows, less } = *samples;
     for y in 0..rows.height {
         let (chunks, rest) = rows.row(y).as_chunks::<LANES>();
         if let Some(less) = less {
             let (other_chunks, other_rest) = less.row(y).as_chunks::<LANES>();
             for (chunk, other) in chunks.iter().zip(other_chunks) {
-                for lane in 0..LANES {
-                    add(lane, chunk[lane] - other[lane]);
-                }
+                sums.add(chunk, other, clip);
             }
-            for (lane, (value, other)) in rest.iter().zip(other_rest).enumerate() {
-                add(lane, value - other);
+            if !rest.is_empty() {
+                sums.add(&padded(rest), &padded(other_rest), clip);
             }
         } else {
             for chunk in chunks {
-                for (lane, value) in chunk.iter().enumerate() {
-                    add(lane, *value);
-                }
+                sums.add(chunk, &[0.0; LANES], clip);
             }
-            for (lane, value) in rest.iter().enumerate() {
-                add(lane, *value);
+            if !rest.is_empty() {
+                sums.add(&padded(rest), &[0.0; LANES], clip);
             }
         }
     }
-    let mut total = 0;
-    for count in count {
-        total += count;
+    sums.total()
+}
+
+/// Which samples count.
+#[derive(Clone, Copy)]
+struct Clip {
+    center: f32,
+    half_width: f32,
+}
+
+/// Sums side by side, in registers: no lane is ever picked out by its number.
+#[derive(Clone, Copy)]
+struct ClippedSums {
+    count: [u32; LANES],
+    sum: [f32; LANES],
+    squares: [f32; LANES],
+}
+
+impl Default for ClippedSums {
+    fn default() -> Self {
+        Self {
+            count: [0; LANES],
+            sum: [0.0; LANES],
+            squares: [0.0; LANES],
+        }
     }
-    [total as f32, pairwise_sum(sum), pairwise_sum(squares)]
+}
+
+impl ClippedSums {
+    /// Adds samples less others.
+    #[inline(always)]
+    fn add(&mut self, samples: &[f32; LANES], less: &[f32; LANES], clip: Clip) {
+        for lane in 0..LANES {
+            let deviation = samples[lane] - less[lane] - clip.center;
+            let inside = deviation.abs() <= clip.half_width;
+            let kept = if inside { deviation } else { 0.0 };
+            self.count[lane] += u32::from(inside);
+            self.sum[lane] += kept;
+            self.squares[lane] += kept * kept;
+        }
+    }
+
+    #[inline(always)]
+    fn total(self) -> [f32; 3] {
+        let mut total = 0;
+        for count in self.count {
+            total += count;
+        }
+        [
+            total as f32,
+            pairwise_sum(self.sum),
+            pairwise_sum(self.squares),
+        ]
+    }
+}
+
+/// The last samples of a row; NaN, which does not count, after them.
+#[inline(always)]
+fn padded(rest: &[f32]) -> [f32; LANES] {
+    let mut lanes = [f32::NAN; LANES];
+    lanes[..rest.len()].copy_from_slice(rest);
+    lanes
 }

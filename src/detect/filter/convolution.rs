@@ -1,7 +1,7 @@
 //! Inner loops of the matched filter: normalisation, and sums along rows and columns.
 
 use crate::detect::background::Piece;
-use crate::detect::pixels::Samples;
+use crate::detect::pixels::{PixelLevel, Samples};
 use crate::detect::psf::MAX_TAPS;
 use multiversion::multiversion;
 
@@ -20,7 +20,7 @@ pub(crate) fn normalise(row: Samples<'_>, pieces: &[Piece], target: &mut [f32]) 
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
-fn normalise_of<T: Copy + Into<f32>>(row: &[T], pieces: &[Piece], target: &mut [f32]) {
+fn normalise_of<T: PixelLevel + Into<f32>>(row: &[T], pieces: &[Piece], target: &mut [f32]) {
     for piece in pieces {
         let (row, target) = (
             &row[piece.start..piece.end],
@@ -31,7 +31,11 @@ fn normalise_of<T: Copy + Into<f32>>(row: &[T], pieces: &[Piece], target: &mut [
             let t = i as i32 as f32;
             let value = (pixel.into() - (piece.background + t * piece.background_slope))
                 * (piece.inverse_sigma + t * piece.inverse_sigma_slope);
-            *out = if value.is_nan() { 0.0 } else { value };
+            *out = if T::MAY_BE_NAN && value.is_nan() {
+                0.0
+            } else {
+                value
+            };
         }
     }
 }

@@ -59,6 +59,8 @@ impl ReachedBlock {
 pub(crate) trait PixelLevel: Copy + PartialOrd {
     /// No value is lower.
     const LOWEST: Self;
+    /// Whether a pixel can be without a value.
+    const MAY_BE_NAN: bool;
     /// The least value that reaches the threshold; `None` if no value does.
     fn reaching(threshold: f32) -> Option<Self>;
 }
@@ -73,6 +75,7 @@ fn whole_from(threshold: f32) -> Option<u32> {
 
 impl PixelLevel for u8 {
     const LOWEST: Self = 0;
+    const MAY_BE_NAN: bool = false;
 
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
@@ -82,6 +85,7 @@ impl PixelLevel for u8 {
 
 impl PixelLevel for u16 {
     const LOWEST: Self = 0;
+    const MAY_BE_NAN: bool = false;
 
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
@@ -91,6 +95,7 @@ impl PixelLevel for u16 {
 
 impl PixelLevel for f32 {
     const LOWEST: Self = f32::NEG_INFINITY;
+    const MAY_BE_NAN: bool = true;
 
     #[inline(always)]
     fn reaching(threshold: f32) -> Option<Self> {
