@@ -20,6 +20,8 @@ pub(crate) const MIN_SAMPLES: usize = 12;
 pub(crate) const DIFFERENCE_PX: usize = 2;
 /// Samples summed side by side.
 const LANES: usize = 32;
+/// How many of them are in a vector.
+const PART: usize = 8;
 
 /// Mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,35 +121,41 @@ struct Clip {
     half_width: f32,
 }
 
-/// Sums side by side, in registers: no lane is ever picked out by its number.
-#[derive(Clone, Copy)]
-struct ClippedSums {
-    count: [u32; LANES],
-    sum: [f32; LANES],
-    squares: [f32; LANES],
-}
+/// A vector of samples.
+type Part = [f32; PART];
 
-impl Default for ClippedSums {
-    fn default() -> Self {
-        Self {
-            count: [0; LANES],
-            sum: [0.0; LANES],
-            squares: [0.0; LANES],
-        }
-    }
+/// Sums side by side, in registers: no lane is ever picked out by its number, and all parts share one count.
+#[derive(Clone, Copy, Default)]
+struct ClippedSums {
+    count: [u32; PART],
+    sum: [Part; LANES / PART],
+    squares: [Part; LANES / PART],
 }
 
 impl ClippedSums {
     /// Adds samples less others.
     #[inline(always)]
     fn add(&mut self, samples: &[f32; LANES], less: &[f32; LANES], clip: Clip) {
-        for lane in 0..LANES {
-            let deviation = samples[lane] - less[lane] - clip.center;
-            let inside = deviation.abs() <= clip.half_width;
-            let kept = if inside { deviation } else { 0.0 };
-            self.count[lane] += u32::from(inside);
-            self.sum[lane] += kept;
-            self.squares[lane] += kept * kept;
+        let (samples, less) = (samples.as_chunks::<PART>().0, less.as_chunks::<PART>().0);
+        for part in 0..LANES / PART {
+            let (samples, less) = (samples[part], less[part]);
+            let mut kept = [0.0; PART];
+            let mut inside = [0u32; PART];
+            for lane in 0..PART {
+                let deviation = samples[lane] - less[lane] - clip.center;
+                let is_inside = deviation.abs() <= clip.half_width;
+                kept[lane] = if is_inside { deviation } else { 0.0 };
+                inside[lane] = u32::from(is_inside);
+            }
+            for lane in 0..PART {
+                self.count[lane] += inside[lane];
+            }
+            for lane in 0..PART {
+                self.sum[part][lane] += kept[lane];
+            }
+            for lane in 0..PART {
+                self.squares[part][lane] += kept[lane] * kept[lane];
+            }
         }
     }
 
@@ -157,11 +165,10 @@ impl ClippedSums {
         for count in self.count {
             total += count;
         }
-        [
-            total as f32,
-            pairwise_sum(self.sum),
-            pairwise_sum(self.squares),
-        ]
+        let [mut sum, mut squares] = [[0.0; LANES]; 2];
+        sum.copy_from_slice(self.sum.as_flattened());
+        squares.copy_from_slice(self.squares.as_flattened());
+        [total as f32, pairwise_sum(sum), pairwise_sum(squares)]
     }
 }
 

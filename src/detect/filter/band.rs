@@ -26,7 +26,7 @@ pub(crate) struct FilteredBand {
     /// A normalised row from `lead` on, padded with zeros over at least the kernel's radius.
     padded_row: AlignedBuffer,
     lead: usize,
-    /// Ring buffer of rows filtered along x: row y is in slot y modulo their number.
+    /// Ring buffer of rows filtered along x: row y is in slot y modulo their number, a power of two.
     ring: AlignedBuffer,
     /// The row of the frame after the last one in the ring.
     next_row: usize,
@@ -48,7 +48,7 @@ impl FilteredBand {
         for (buffer, size) in [
             (&mut self.padded_row, self.padded_width + 2 * self.lead),
             (&mut self.zeros, self.padded_width),
-            (&mut self.ring, (2 * radius + 1) * self.stride),
+            (&mut self.ring, slots_for(radius) * self.stride),
         ] {
             buffer.grow(size);
             buffer.fill(0.0);
@@ -92,7 +92,7 @@ impl FilteredBand {
         mesh.row_pieces(y, &mut self.pieces);
         let target = &mut self.padded_row[self.lead..self.lead + self.width];
         normalise(view.row(y), &self.pieces, target);
-        let slot = y % (2 * radius + 1);
+        let slot = y & (slots_for(radius) - 1);
         let out = &mut self.ring[slot * self.stride..][..self.padded_width];
         sum_along_row(kernel.half(), &self.padded_row[self.lead - radius..], out);
         for &(x, factor) in &self.border_factors {
@@ -104,10 +104,10 @@ impl FilteredBand {
     /// Filters the ring's rows around row `y` along y, into the band's row.
     fn filter_along_columns(&mut self, kernel: &Kernel, y: usize, height: usize) {
         let radius = kernel.radius();
-        let slots = 2 * radius + 1;
+        let last_slot = slots_for(radius) - 1;
         let row = |at: Option<usize>| match at {
             Some(r) if r < height => {
-                let slot = r % slots;
+                let slot = r & last_slot;
                 &self.ring[slot * self.stride..][..self.padded_width]
             }
             _ => &self.zeros[..self.padded_width],
@@ -152,6 +152,11 @@ impl FilteredBand {
             &self.values[start..start + self.width]
         })
     }
+}
+
+/// Rows in the ring for a kernel that reaches so far: a division for each row takes longer than some rows more.
+fn slots_for(radius: usize) -> usize {
+    (2 * radius + 1).next_power_of_two()
 }
 
 #[cfg(test)]

@@ -21,22 +21,38 @@ pub(crate) fn normalise(row: Samples<'_>, pieces: &[Piece], target: &mut [f32]) 
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma"))]
 fn normalise_of<T: PixelLevel + Into<f32>>(row: &[T], pieces: &[Piece], target: &mut [f32]) {
+    const LANES: usize = 16;
+    let lanes: [f32; LANES] = std::array::from_fn(|lane| lane as f32);
     for piece in pieces {
         let (row, target) = (
             &row[piece.start..piece.end],
             &mut target[piece.start..piece.end],
         );
+        let (chunks, rest) = row.as_chunks::<LANES>();
+        let (outs, out_rest) = target.as_chunks_mut::<LANES>();
         let piece = *piece;
-        for (i, (out, &pixel)) in target.iter_mut().zip(row).enumerate() {
-            let t = i as i32 as f32;
-            let value = (pixel.into() - (piece.background + t * piece.background_slope))
-                * (piece.inverse_sigma + t * piece.inverse_sigma_slope);
-            *out = if T::MAY_BE_NAN && value.is_nan() {
-                0.0
-            } else {
-                value
-            };
+        let mut first = 0.0;
+        for (pixels, out) in chunks.iter().zip(outs) {
+            for lane in 0..LANES {
+                out[lane] = standardised(pixels[lane], first + lanes[lane], &piece);
+            }
+            first += LANES as f32;
         }
+        for (lane, (&pixel, out)) in rest.iter().zip(out_rest).enumerate() {
+            *out = standardised(pixel, first + lane as i32 as f32, &piece);
+        }
+    }
+}
+
+/// A pixel `t` columns from the start of a piece, less the background and over the noise.
+#[inline(always)]
+fn standardised<T: PixelLevel + Into<f32>>(pixel: T, t: f32, piece: &Piece) -> f32 {
+    let value = (pixel.into() - (piece.background + t * piece.background_slope))
+        * (piece.inverse_sigma + t * piece.inverse_sigma_slope);
+    if T::MAY_BE_NAN && value.is_nan() {
+        0.0
+    } else {
+        value
     }
 }
 
