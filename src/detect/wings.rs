@@ -21,6 +21,7 @@ use super::pixels::View;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::{Estimate, SIGMA_PER_MAD, normal_density};
 use arrayvec::ArrayVec;
+use std::ops::Range;
 
 /// The core and the rings.
 const PARTS: usize = 4;
@@ -191,42 +192,59 @@ impl WingFrame<'_> {
     fn light_around(&self, star: &Detection) -> Option<[Estimate; PARTS]> {
         let at = star.position;
         let [columns, rows] = self.box_around(&at)?;
-        if self.others(&at, self.ends_px[0]).next().is_some() {
-            return None;
-        }
+        let core_px = self.ends_px[0] + self.margin_px;
         let mut others: ArrayVec<PixelPoint, MAX_OTHERS> = ArrayVec::new();
         for other in self.others(&at, self.ends_px[PARTS - 1]) {
+            if is_nearer(&other, &at, core_px) {
+                return None;
+            }
             others.try_push(other).ok()?;
         }
         let (level, noise) = self.background.at(at.x as f32, at.y as f32);
-        let ends2_px = self.ends_px.map(|end_px| end_px * end_px);
         let mut sums = [RingSum::default(); PARTS];
+        let mut buffer = Vec::new();
         for y in rows {
             let dy = y as f64 - at.y;
-            for x in columns.clone() {
-                let dx = x as f64 - at.x;
-                let r2 = dx * dx + dy * dy;
-                // The parts that end nearer, without a branch for each.
-                let part = ends2_px.iter().map(|&end2| usize::from(r2 >= end2)).sum();
-                let Some(sum) = sums.get_mut::<usize>(part) else {
+            let row = self.view.row(y).span(columns.clone());
+            let row = RowOfRings {
+                pixels: row.as_floats(&mut buffer),
+                first: columns.start,
+                level,
+            };
+            let is_near = |other: &&PixelPoint| (other.y - y as f64).abs() < self.margin_px;
+            let near: ArrayVec<&PixelPoint, MAX_OTHERS> = others.iter().filter(is_near).collect();
+            let is_seen = |x: usize| {
+                let pixel = PixelPoint::new(x as f64, y as f64);
+                !near
+                    .iter()
+                    .any(|other| is_nearer(&pixel, other, self.margin_px))
+            };
+            // Each part is what is within its end on either side of the part before.
+            let mut within = None;
+            for (part, (sum, end_px)) in sums.iter_mut().zip(self.ends_px).enumerate() {
+                let Some([first, end]) = columns_within(end_px, at.x, dy) else {
                     continue;
                 };
-                let is_others = |other| {
-                    is_nearer(&PixelPoint::new(x as f64, y as f64), other, self.margin_px)
-                };
-                let is_seen = part == 0 || !others.iter().any(is_others);
-                sum.add(f64::from(self.view.at(x, y) - level), is_seen);
+                let [left, right] = within.unwrap_or([first, first]);
+                for span in [first..left, right..end] {
+                    if part == 0 || near.is_empty() {
+                        row.add_to(sum, span, |_| true);
+                    } else {
+                        row.add_to(sum, span, is_seen);
+                    }
+                }
+                within = Some([first, end]);
             }
         }
         Some(sums.map(|sum| sum.over(star.flux_adu, f64::from(noise))))
     }
 
     /// Columns and rows of the outermost ring around a place; `None` where they are not all in the frame.
-    fn box_around(&self, at: &PixelPoint) -> Option<[std::ops::RangeInclusive<usize>; 2]> {
+    fn box_around(&self, at: &PixelPoint) -> Option<[Range<usize>; 2]> {
         let radius_px = self.ends_px[PARTS - 1];
         let span = |center: f64, side: usize| {
             let (first, last) = ((center - radius_px).ceil(), (center + radius_px).floor());
-            (first >= 0.0 && last < side as f64).then_some(first as usize..=last as usize)
+            (first >= 0.0 && last < side as f64).then_some(first as usize..last as usize + 1)
         };
         Some([span(at.x, self.view.width)?, span(at.y, self.view.height)?])
     }
@@ -236,6 +254,38 @@ impl WingFrame<'_> {
         let places = self.sources.iter().map(|source| source.position);
         let reach_px = distance_px + self.margin_px;
         places.filter(move |place| place != at && is_nearer(place, at, reach_px))
+    }
+}
+
+/// The columns that are nearer than `end_px` to column `x` of a row `dy` away, as the first and the end; `None`
+/// where there are none.
+fn columns_within(end_px: f64, x: f64, dy: f64) -> Option<[usize; 2]> {
+    let half2 = end_px * end_px - dy * dy;
+    let half = half2.max(0.0).sqrt();
+    // As integers, which need no call for rounding.
+    let (first, last) = ((x - half) as usize + 1, (x + half) as usize);
+    let end = last + usize::from((last as f64) < x + half);
+    (half2 > 0.0 && first < end).then_some([first, end])
+}
+
+/// A row of the box around a star.
+struct RowOfRings<'a> {
+    pixels: &'a [f32],
+    /// Column of the first pixel.
+    first: usize,
+    /// Background, in ADU.
+    level: f32,
+}
+
+impl RowOfRings<'_> {
+    /// Adds the pixels of some columns.
+    fn add_to(&self, sum: &mut RingSum, columns: Range<usize>, is_seen: impl Fn(usize) -> bool) {
+        for (x, pixel) in columns
+            .clone()
+            .zip(&self.pixels[columns.start - self.first..columns.end - self.first])
+        {
+            sum.add(f64::from(pixel - self.level), is_seen(x));
+        }
     }
 }
 
