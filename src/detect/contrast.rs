@@ -12,6 +12,7 @@
 use super::background::Mesh;
 use super::pixels::View;
 use super::psf::centered_profile;
+use std::sync::LazyLock;
 
 /// Sharper spots than this are of single pixels: no lens draws them, in pixels.
 pub(crate) const HOT_PIXEL_PX: f64 = 0.28;
@@ -50,21 +51,24 @@ impl Contrast {
     pub fn near(view: &View<'_>, background: &Mesh, x: usize, y: usize) -> Self {
         let columns = x.saturating_sub(1)..(x + 2).min(view.width);
         let rows = y.saturating_sub(1)..(y + 2).min(view.height);
-        let pixels = rows.flat_map(|row| columns.clone().map(move |column| (column, row)));
-        let value = |&(x, y): &(usize, usize)| view.at(x, y);
-        let brightest = pixels
-            .filter(|pixel| !value(pixel).is_nan())
-            .max_by(|a, b| value(a).total_cmp(&value(b)));
-        let (x, y) = brightest.unwrap_or((x, y));
+        let mut brightest = (f32::NEG_INFINITY, x, y);
+        for row in rows {
+            for column in columns.clone() {
+                let value = view.at(column, row);
+                // False where it is NaN.
+                if value >= brightest.0 {
+                    brightest = (value, column, row);
+                }
+            }
+        }
+        let (_, x, y) = brightest;
         Self::measure(view, background, x, y)
     }
 
-    /// In how many of both directions the light beside the pixel is less than spots of `spot_px`
-    /// leave there, beyond `sigmas` standard deviations of noise, which `shot_adu` per ADU of light
-    /// adds to.
-    pub fn sharp_directions(&self, spot_px: f64, sigmas: f64, shot_adu: f64) -> usize {
-        let profile = centered_profile(spot_px, 1);
-        let least = 2.0 * profile[1] / profile[0];
+    /// In how many of both directions the light beside the pixel is less than the `least` that spots
+    /// leave there ([`least_beside`]), beyond `sigmas` standard deviations of noise, which `shot_adu` per
+    /// ADU of light adds to.
+    pub fn sharp_directions(&self, least: f64, sigmas: f64, shot_adu: f64) -> usize {
         let of_light = shot_adu * self.top.max(0.0) * least * (1.0 + least);
         let variance = (2.0 + least * least) * self.noise * self.noise + of_light;
         let limit = least * self.top - sigmas * variance.sqrt();
@@ -74,8 +78,15 @@ impl Contrast {
     /// Whether the pixel is hot, or part of a cosmic ray, as far as a frame says of whose spots
     /// nothing is known.
     pub fn is_sharper_than_any_spot(&self) -> bool {
-        self.sharp_directions(HOT_PIXEL_PX, 0.0, 0.0) > 0
+        static LEAST: LazyLock<f64> = LazyLock::new(|| least_beside(HOT_PIXEL_PX));
+        self.sharp_directions(*LEAST, 0.0, 0.0) > 0
     }
+}
+
+/// The least light in the two pixels beside one, over that in it, of spots of this size and wider.
+pub(crate) fn least_beside(spot_px: f64) -> f64 {
+    let profile = centered_profile(spot_px, 1);
+    2.0 * profile[1] / profile[0]
 }
 
 #[cfg(test)]
@@ -118,7 +129,7 @@ mod tests {
             spot_px in 0.3..2.0,
         ) {
             let contrast = contrast_of(&draw(&stars, spot_px, 13), 13);
-            prop_assert_eq!(contrast.sharp_directions(0.98 * spot_px, 0.0, 0.0), 0);
+            prop_assert_eq!(contrast.sharp_directions(least_beside(0.98 * spot_px), 0.0, 0.0), 0);
         }
     }
 
@@ -127,13 +138,13 @@ mod tests {
         let mut scene = vec![0.0; 13 * 13];
         scene[6 * 13 + 6] = 100.0;
         let hot = contrast_of(&scene, 13);
-        assert_eq!(hot.sharp_directions(0.5, 0.0, 0.0), 2);
+        assert_eq!(hot.sharp_directions(least_beside(0.5), 0.0, 0.0), 2);
         assert!(hot.is_sharper_than_any_spot());
         for x in 4..9 {
             scene[6 * 13 + x] = 80.0 + x as f64;
         }
         let ray = contrast_of(&scene, 13);
-        assert_eq!(ray.sharp_directions(0.5, 0.0, 0.0), 1);
+        assert_eq!(ray.sharp_directions(least_beside(0.5), 0.0, 0.0), 1);
     }
 
     #[test]
@@ -143,7 +154,7 @@ mod tests {
             beside: [0.0, 8.0],
             noise: 2.0,
         };
-        assert_eq!(contrast.sharp_directions(0.6, 0.0, 0.0), 1);
-        assert_eq!(contrast.sharp_directions(0.6, 4.0, 0.0), 0);
+        assert_eq!(contrast.sharp_directions(least_beside(0.6), 0.0, 0.0), 1);
+        assert_eq!(contrast.sharp_directions(least_beside(0.6), 4.0, 0.0), 0);
     }
 }

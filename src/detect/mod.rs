@@ -80,6 +80,7 @@ pub use workspace::{VisitedPixels, Workspace};
 use crate::frame::{Frame, MIN_SIDE_PX};
 use background::{FrameBackground, Mesh};
 use candidates::{CandidateMemory, PeakSearch};
+use contrast::least_beside;
 use fineness::CellSize;
 pub(crate) use fineness::least_cell_px;
 use measure::{MeasureBuffers, Measurement, Ring, StarShape, sharpest_px};
@@ -276,7 +277,7 @@ fn measure_spots(
     let measurement = Measurement {
         maps,
         shape,
-        sharpest_px: sharpest_px(&maps, &shape),
+        least_beside: least_beside(sharpest_px(&maps, &shape)),
         noise: stars.noise,
         method: input.config.centroid,
         regions,

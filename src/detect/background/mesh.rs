@@ -36,6 +36,8 @@ pub(crate) struct Mesh {
     node_starts: Vec<usize>,
     /// The pieces along each row of nodes.
     pieces: Vec<Piece>,
+    /// Whether the background bends more than that of a sky anywhere.
+    is_bent: bool,
     smoother: Smoother,
 }
 
@@ -240,9 +242,9 @@ impl Mesh {
 
     /// Whether the background bends near a place more than that of a sky.
     pub fn is_bent_at(&self, x: f32, y: f32) -> bool {
-        /// The bend of an edge, in noises of a pixel. The background that bends by less moves stars by less than
-        /// a tenth of a standard error.
-        const SIGMAS: f32 = 3.0;
+        if !self.is_bent {
+            return false;
+        }
         let CellGrid { columns, rows, .. } = self.grid;
         let at = self.grid.cell_at(
             (x.max(0.0) as usize).min(self.grid.width_px - 1),
@@ -250,12 +252,31 @@ impl Mesh {
         );
         let inner = |at: usize, count: usize| at.max(2) - 1..(at + 2).min(count.saturating_sub(1));
         let (row, column) = (at / columns, at % columns);
-        let bends =
-            |cell: usize, step: usize| bend(self.around(cell, step)) > SIGMAS * self.sigma[cell];
+        let bends = |cell: usize, step: usize| self.bends(cell, step);
         let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         near(row, rows).any(|y| inner(column, columns).any(|x| bends(y * columns + x, 1)))
             || inner(row, rows)
                 .any(|y| near(column, columns).any(|x| bends(y * columns + x, columns)))
+    }
+
+    /// Whether the background bends more than that of a sky, from the cell `step` before a cell to that after.
+    fn bends(&self, cell: usize, step: usize) -> bool {
+        /// The bend of an edge, in noises of a pixel. The background that bends by less moves stars by less than
+        /// a tenth of a standard error.
+        const SIGMAS: f32 = 3.0;
+        bend(self.around(cell, step)) > SIGMAS * self.sigma[cell]
+    }
+
+    /// Whether it does so anywhere: in most frames it does not, and no place needs to be looked at.
+    fn bends_anywhere(&self) -> bool {
+        let CellGrid { columns, rows, .. } = self.grid;
+        let mut cells = (0..rows).flat_map(|y| (0..columns).map(move |x| [x, y]));
+        cells.any(|[x, y]| {
+            let cell = y * columns + x;
+            let is_inner = |at: usize, count: usize| at > 0 && at + 1 < count;
+            is_inner(x, columns) && self.bends(cell, 1)
+                || is_inner(y, rows) && self.bends(cell, columns)
+        })
     }
 
     /// The column of pixels at the centre of a column of cells.
@@ -283,6 +304,12 @@ impl Mesh {
             self.blend(&self.background, place),
             self.blend(&self.sigma, place.clamped()),
         )
+    }
+
+    /// The background of [`Self::at`] alone.
+    #[inline]
+    pub fn background_at(&self, x: f32, y: f32) -> f32 {
+        self.blend(&self.background, self.place(x, y))
     }
 
     /// The noise from slopes at column `x`, row `y`, along x and along y.
@@ -314,11 +341,14 @@ impl Mesh {
             across,
             down,
         } = place;
-        let right = (column + 1).min(self.grid.columns - 1);
-        let below = (row + 1).min(self.grid.rows - 1);
-        let value = |r: usize, c: usize| map[r * self.grid.columns + c];
-        let top = value(row, column) + across * (value(row, right) - value(row, column));
-        let bottom = value(below, column) + across * (value(below, right) - value(below, column));
+        let CellGrid { columns, rows, .. } = self.grid;
+        let right = (column + 1).min(columns - 1);
+        let below = (row + 1).min(rows - 1);
+        let in_row = |row: usize| {
+            let row = &map[row * columns..][..columns];
+            row[column] + across * (row[right] - row[column])
+        };
+        let (top, bottom) = (in_row(row), in_row(below));
         top + down * (bottom - top)
     }
 
@@ -347,6 +377,7 @@ impl Mesh {
 
     /// Sets the pieces along each row of nodes: after any change of background or noise.
     pub fn set_pieces(&mut self) {
+        self.is_bent = self.bends_anywhere();
         let columns = self.grid.columns;
         self.pieces.clear();
         for row in 0..self.grid.rows {

@@ -19,8 +19,8 @@ use crate::base::interrupt::Interrupted;
 use crate::detect::pixels::View;
 use multiversion::multiversion;
 
-/// Logarithm to base 2 of the number of saddles that are remembered.
-const RECENT_BITS: u32 = 13;
+/// Logarithms to base 2 of the least and the largest number of saddles that are remembered.
+const RECENT_BITS: [u32; 2] = [6, 13];
 /// Saddles from which on repeated ones are left out.
 const MANY_SADDLES: usize = 1 << 20;
 
@@ -34,11 +34,11 @@ struct Saddle {
 }
 
 impl Saddle {
-    /// Its place among the recent ones.
-    fn slot(&self) -> usize {
+    /// Its place among the recent ones, of which there are 2 to the power of `bits`.
+    fn slot(&self, bits: u32) -> usize {
         let [a, b] = self.tops;
         let hash = a.wrapping_mul(0x9e37_79b9) ^ b.wrapping_mul(0x85eb_ca6b);
-        (hash >> (u32::BITS - RECENT_BITS)) as usize
+        (hash >> (u32::BITS - bits)) as usize
     }
 }
 
@@ -119,7 +119,10 @@ impl Prominence {
         } = self;
         saddles.clear();
         recent.clear();
-        recent.resize(1 << RECENT_BITS, Saddle::default());
+        // No more than there are pixels: most frames have few.
+        let [least, most] = RECENT_BITS;
+        let bits = labelling.heights.len().max(1).ilog2().clamp(least, most);
+        recent.resize(1 << bits, Saddle::default());
         let mut many = MANY_SADDLES;
         labelling.for_each_adjacent(
             view,
@@ -140,7 +143,7 @@ impl Prominence {
                         tops: [a.min(b), a.max(b)],
                         snr: snr.min(of_before),
                     };
-                    let last = &mut recent[found.slot()];
+                    let last = &mut recent[found.slot(bits)];
                     if last.tops == found.tops {
                         last.snr = last.snr.max(found.snr);
                     } else {

@@ -39,7 +39,7 @@ impl BackgroundPlane {
 
     /// That of the map.
     fn of_map(map: &Mesh, window: &Window) -> Self {
-        let background = |x: usize, y: usize| map.at(x as f32, y as f32).0;
+        let background = |x: usize, y: usize| map.background_at(x as f32, y as f32);
         let (x0, y0) = (window.x0, window.y0);
         let corner = background(x0, y0);
         Self {

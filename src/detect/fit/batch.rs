@@ -184,8 +184,12 @@ impl BatchFitter {
                 .get(y * groups..(y + 1) * groups)
                 .unwrap_or_default();
             let row = row.as_flattened();
-            for (x, to) in to.iter_mut().enumerate() {
-                to[lane] = row.get(x).copied().unwrap_or(f32::NAN);
+            let (inside, beyond) = to.split_at_mut(row.len().min(to.len()));
+            for (to, &from) in inside.iter_mut().zip(row) {
+                to[lane] = from;
+            }
+            for to in beyond {
+                to[lane] = f32::NAN;
             }
         }
     }

@@ -15,8 +15,8 @@ pub(crate) struct FitBuffers {
     pub window: Window,
     /// The pixels of a fit that is kept while another is tried.
     pub kept_window: Window,
-    /// For many fits of single spots.
-    pub batch: BatchFitter,
+    /// For many fits of single spots; it is large, and taken out while it is used.
+    pub batch: Option<Box<BatchFitter>>,
 }
 
 impl FitBuffers {

@@ -11,7 +11,6 @@ use crate::detect::filter::Kernel;
 use crate::detect::fit::{BatchStart, FitBuffers, FitConfig, FrameMaps, SpotEstimate, SpotFit};
 use crate::detect::star_model::{BrightPeak, MAX_STARS, rough_star_model};
 use arrayvec::ArrayVec;
-use std::mem;
 
 /// Fewer stars do not tell a pointing that is sure.
 const MIN_STARS: usize = 8;
@@ -99,13 +98,13 @@ impl BrightestStars {
             spot: peak.start(maps),
             spot_px: maps.spot_px,
         });
-        let mut batch = mem::take(&mut fits.batch);
+        let mut batch = fits.batch.take().unwrap_or_default();
         batch.fit(maps, starts, &config, |number, fit, _| {
             let peak = &peaks[number];
             let of_fit = fit.and_then(|fit| of_fit(&fit, peak, maps));
             sources.extend(of_fit.or_else(|| of_core(peak, maps)));
         });
-        fits.batch = batch;
+        fits.batch = Some(batch);
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) fn detection_of(
     let mut spot = best_estimate(maps, noise, fit, peak, region);
     let (width, height) = (maps.view.width, maps.view.height);
     clamp_to_frame(&mut spot, width, height);
-    let background = f64::from(maps.background.at(peak.x as f32, peak.y as f32).0);
+    let background = f64::from(maps.background.background_at(peak.x as f32, peak.y as f32));
     // Where all pixels next to the peak are NaN, more distant ones made it.
     let brightest = [1, maps.window_radius(maps.spot_px)]
         .into_iter()

@@ -17,7 +17,6 @@ use crate::detect::fit::{
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use crate::detect::threads::for_each_worker;
-use std::mem;
 
 /// Spots closer than this many of their standard deviations touch, and are fitted together.
 const TOUCHING_SIGMA: f64 = 4.6;
@@ -53,8 +52,8 @@ pub(crate) struct Measurement<'a> {
     pub noise: NoiseModel,
     /// The shape of the stars.
     pub shape: StarShape,
-    /// Size of the sharpest spots that stars have, in pixels.
-    pub sharpest_px: f64,
+    /// The least light beside a pixel of a star, over that in it.
+    pub least_beside: f64,
     /// How positions are measured.
     pub method: CentroidMethod,
     /// The regions that hold the peaks.
@@ -130,7 +129,7 @@ impl Measurement<'_> {
         for index in singly {
             self.measure(&surroundings(index), None, fits, detections);
         }
-        let mut batch = mem::take(&mut fits.batch);
+        let mut batch = fits.batch.take().unwrap_or_default();
         let starts = in_batches.map(|index| BatchStart {
             number: index,
             spot: spots[index],
@@ -143,7 +142,7 @@ impl Measurement<'_> {
             let fit = fit.unwrap_or_else(unfitted);
             self.measure(&surroundings(index), Some(fit), fits, detections);
         });
-        fits.batch = batch;
+        fits.batch = Some(batch);
     }
 
     /// Distance within which a spot matters to another, in pixels.
@@ -369,7 +368,7 @@ impl Measurement<'_> {
     /// Whether the brightest pixel at a peak is sharper than the optics. Charge that ran along a
     /// column from a saturated star is sharp in one direction.
     fn is_too_sharp(&self, peak: &Peak) -> bool {
-        shape::is_too_sharp(&self.maps, &self.noise, peak, self.sharpest_px)
+        shape::is_too_sharp(&self.maps, &self.noise, peak, self.least_beside)
     }
 
     /// The peak of a spot that the filter merged into `peak`.

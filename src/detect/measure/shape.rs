@@ -30,18 +30,18 @@ impl StarSize {
     const SIGNIFICANT_SIGMA: f64 = 4.0;
 }
 
-/// Whether the brightest pixel at a peak did not get its light through a lens that draws spots of
-/// `sharpest_px` and wider: a hot pixel, a cosmic ray. Charge that ran from a saturated star along a
+/// Whether the brightest pixel at a peak did not get its light through a lens whose spots leave at least
+/// `least_beside` of the light of a pixel beside it: a hot pixel, a cosmic ray. Charge that ran from a saturated star along a
 /// column is sharp in one direction.
 pub(super) fn is_too_sharp(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
     peak: &Peak,
-    sharpest_px: f64,
+    least_beside: f64,
 ) -> bool {
     let contrast = maps.contrast_at(peak);
     let sigmas = StarSize::SIGNIFICANT_SIGMA * maps.correlation_at(peak.x as f64, peak.y as f64);
-    let directions = contrast.sharp_directions(sharpest_px, sigmas, noise.shot_adu);
+    let directions = contrast.sharp_directions(least_beside, sigmas, noise.shot_adu);
     directions >= if peak.saturated { 2 } else { 1 }
 }
 

@@ -12,7 +12,6 @@ use crate::detect::fit::{
 };
 use crate::detect::psf::PIXEL_VARIANCE_PX2;
 use arrayvec::ArrayVec;
-use std::mem;
 
 /// Peaks below this signal-to-noise ratio say little about the size.
 const MIN_SNR: f32 = 12.0;
@@ -255,7 +254,7 @@ fn fit_stars(
             spot: *spot,
             spot_px: *size_px,
         });
-    let mut batch = mem::take(&mut buffers.batch);
+    let mut batch = buffers.batch.take().unwrap_or_default();
     batch.fit(maps, batch_starts, &config, |number, fit, window| {
         let (spot, size_px) = starts[number];
         let fit = match fit {
@@ -271,7 +270,7 @@ fn fit_stars(
         };
         fits[number] = fit.filter(|fit| fit.spots[0].flux > 0.0 && is_alone(fit, buffers));
     });
-    buffers.batch = batch;
+    buffers.batch = Some(batch);
     fits
 }
 

@@ -76,7 +76,7 @@ fn star_model_in(
             free_size: true,
             noise: model,
         };
-        let mut batch = mem::take(&mut buffers.batch);
+        let mut batch = buffers.batch.take().unwrap_or_default();
         let of_star = |(number, star): (usize, &SpotFit)| BatchStart {
             number,
             spot: star.spots[0],
@@ -92,7 +92,7 @@ fn star_model_in(
                 stars[i] = fit;
             }
         });
-        buffers.batch = batch;
+        buffers.batch = Some(batch);
         model = believable(sums.solve(), maps);
     }
     StarModel {

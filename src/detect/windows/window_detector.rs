@@ -211,9 +211,11 @@ impl WindowDetector {
             cut_out(squares, pixels, start, saturation_adu, window);
         };
         let starts = starts.iter().copied();
-        fits.batch.fit_cut(cut, starts, &config, |number, fit, _| {
-            found[number] = fit.and_then(|fit| star_of(&fit, &expected[number]));
-        });
+        fits.batch
+            .get_or_insert_default()
+            .fit_cut(cut, starts, &config, |number, fit, _| {
+                found[number] = fit.and_then(|fit| star_of(&fit, &expected[number]));
+            });
     }
 
     /// Fits spots with long paths.
@@ -344,9 +346,11 @@ impl WindowDetector {
             cut_out(squares, pixels, start, saturation_adu, window);
         };
         let starts = starts.iter().copied();
-        fits.batch.fit_cut(cut, starts, &config, |_, fit, _| {
-            sizes.extend(fit);
-        });
+        fits.batch
+            .get_or_insert_default()
+            .fit_cut(cut, starts, &config, |_, fit, _| {
+                sizes.extend(fit);
+            });
         let mode = spot_size(&sizes)?;
         let is_near = |fit: &&SpotFit| libm::log(fit.spot_px / mode.spot_px).abs() < 0.25;
         weighted_size(sizes.iter().filter(is_near)).or(Some(mode.spot_px))
