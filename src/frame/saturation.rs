@@ -93,8 +93,18 @@ impl SaturationFinder {
     fn plateau(&mut self, frame: &Frame<'_>, highest_pair: f32) -> Option<f32> {
         let Self { sample, pixels, .. } = self;
         fill_sample(frame, sample);
-        let background = *sample.get(sample.len() / 2)?;
-        let noise = background - sample[NOISE_QUANTILE * sample.len() / 100];
+        let count = sample.len();
+        if count == 0 {
+            return None;
+        }
+        let (lower, background, _) = sample.select_nth_unstable_by(count / 2, f32::total_cmp);
+        let background = *background;
+        let at = NOISE_QUANTILE * count / 100;
+        let darker = match lower {
+            [] => background,
+            lower => *lower.select_nth_unstable_by(at, f32::total_cmp).1,
+        };
+        let noise = background - darker;
         let lowest = |top: f32| top - REACH * (top - background);
         let floor = lowest(highest_pair);
         if floor.partial_cmp(&background) != Some(Ordering::Greater) {
@@ -313,7 +323,7 @@ fn neighbors(pixels: &[BrightPixel], pixel: BrightPixel) -> impl Iterator<Item =
     })
 }
 
-/// Fills `sample` with values from all over the frame, in ascending order.
+/// Fills `sample` with values from all over the frame.
 fn fill_sample(frame: &Frame<'_>, sample: &mut Vec<f32>) {
     let pixels = frame.pixels.len();
     // Odd, so that no column is left out in frames of even widths.
@@ -321,7 +331,6 @@ fn fill_sample(frame: &Frame<'_>, sample: &mut Vec<f32>) {
     let values = (0..pixels).step_by(stride).map(|i| frame.pixels.value(i));
     sample.clear();
     sample.extend(values.filter(|value| !value.is_nan()));
-    sample.sort_unstable_by(f32::total_cmp);
 }
 
 /// The smallest difference between different values; 0 where there is none.
