@@ -134,6 +134,10 @@ struct ClippedSums {
 
 impl ClippedSums {
     /// Adds samples less others.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "lanes of several arrays read best as indices"
+    )]
     #[inline(always)]
     fn add(&mut self, samples: &[f32; LANES], less: &[f32; LANES], clip: Clip) {
         let (samples, less) = (samples.as_chunks::<PART>().0, less.as_chunks::<PART>().0);
