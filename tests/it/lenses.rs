@@ -111,6 +111,15 @@ fn frames_of_the_whole_sky_are_identified_with_nothing_given() {
             found["reason"]
         );
         assert_found(&found, &made);
+        let pointed = Ran::new(
+            starpipe()
+                .args(["process", "--format=json", "--only=pointing"])
+                .arg(&frame),
+        );
+        let pointed = report(&pointed);
+        assert_found(&pointed, &made);
+        let notes = pointed["notes"].as_array().unwrap();
+        assert!(notes.iter().any(|note| note["code"] == "pointing_at_once"));
         let header = std::fs::read(out.join(format!("{projection}.wcs"))).unwrap();
         assert!(
             header
