@@ -20,8 +20,8 @@ pub(crate) struct FrameStar {
     pub detection: Option<usize>,
     /// Whether it is single, well inside the frame, and not hidden.
     pub is_clear: bool,
-    /// Light of undetected neighbors in its flux, over its own; below 0 where there is less of it than in the
-    /// background around.
+    /// Light of undetected neighbors in its flux, over its own; of a clear star less that in the background
+    /// around, so that it may be below 0.
     pub neighbors_light: f64,
 }
 
@@ -291,7 +291,8 @@ mod tests {
         stars.extend((0..8000).map(|_| star(place(), place(), 8.0)));
         let found = associated(&stars, &named);
         let light = |star: &FrameStar| star.neighbors_light;
-        let bright = found.stars.iter().filter(|star| star.v_mag < 6.0);
+        let bright = found.stars.iter();
+        let bright = bright.filter(|star| star.v_mag < 6.0 && star.is_clear);
         let bright: Vec<f64> = bright.map(light).collect();
         // A spot takes up 4π s² = 13.6 pixels, in which 0.7 of the faint stars have 0.043 of a bright one's light.
         let mean = bright.iter().sum::<f64>() / bright.len() as f64;
