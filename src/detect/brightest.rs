@@ -56,7 +56,7 @@ pub(crate) fn look_for_brightest(
         return Ok(());
     }
     background.measure_sparsely(&view, frame.step_adu, config.cell_px)?;
-    let saturation_adu = saturation_adu(frame, config);
+    let saturation_adu = config.or_stated_saturation_adu(frame.saturation_adu);
     Ok(search
         .raw_peaks
         .find(&view, &background.mesh, saturation_adu)?)
@@ -87,7 +87,7 @@ pub(crate) fn measure_brightest_into(
         view: View::of_live_pixels(frame).until(interrupt),
         background: &background.mesh,
         filtered: None,
-        saturation_adu: saturation_adu(frame, config),
+        saturation_adu: config.or_stated_saturation_adu(frame.saturation_adu),
         spot_px: 1.0,
         matched_gain: 1.0,
         psf: None,
@@ -107,13 +107,6 @@ pub(crate) fn measure_brightest_into(
     found.spot_sigma_px = maps.spot_px;
     super::keep_brightest(found, config, false);
     Ok(())
-}
-
-/// The level of saturation, stated or of the format.
-fn saturation_adu(frame: &Frame, config: &DetectConfig) -> f32 {
-    let full_scale_adu = frame.saturation_adu.unwrap_or(f32::INFINITY);
-    let stated_adu = config.saturation_adu;
-    full_scale_adu.min(stated_adu.map_or(f32::INFINITY, |adu| adu as f32))
 }
 
 #[cfg(test)]

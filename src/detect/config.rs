@@ -64,8 +64,12 @@ impl DetectConfig {
     /// The level from which on a pixel of `frame` is saturated, in ADU: the lower of the stated one
     /// and that of the frame; infinite where none is known.
     pub(crate) fn saturation_adu(&self, frame: &Frame, finder: &mut SaturationFinder) -> f32 {
+        self.or_stated_saturation_adu(finder.level_adu(frame))
+    }
+
+    /// The lower of the stated level and that `of_frame`.
+    pub(super) fn or_stated_saturation_adu(&self, of_frame: Option<f32>) -> f32 {
         let stated = self.saturation_adu.map_or(f32::INFINITY, |adu| adu as f32);
-        let of_frame = finder.level_adu(frame);
         of_frame.unwrap_or(f32::INFINITY).min(stated)
     }
 }

@@ -102,9 +102,11 @@ impl StarField {
 
 /// The stars of the same frame, detected otherwise, in pixels of the whole frame.
 pub trait OtherFields {
-    /// The brightest, as single pixels show them: few of them, and so many that parts of the frame have enough;
-    /// `None` where there are none.
-    fn brightest(&self) -> Option<[&StarField; 2]>;
+    /// A few of the brightest, as single pixels show them; `None` where there are none.
+    fn few_brightest(&self) -> Option<&StarField>;
+
+    /// So many of them that parts of the frame have enough; `None` where there are none.
+    fn many_brightest(&self) -> Option<&StarField>;
 
     /// Number of lower resolutions.
     fn resolutions(&self) -> usize;

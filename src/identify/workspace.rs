@@ -34,7 +34,7 @@ const CHANCE_PAIRS: f64 = 0.02;
 /// A fit is good if it names this share of the stars that it began with.
 const GOOD_FRACTION: f64 = 0.5;
 
-/// Stars that an attitude alone is fitted to, the brightest.
+/// Stars that an attitude alone is fitted to, the brightest; more where it took more to find it.
 const ATTITUDE_STARS: usize = 100;
 
 /// A name is given where the odds that it is right are at least these, unless others are stated.
@@ -255,11 +255,7 @@ impl Workspace {
                 }
             };
             search = next;
-            found = of_others.found;
-            best_log10 = [best_log10, of_others.best_log10]
-                .into_iter()
-                .flatten()
-                .reduce(f64::min);
+            FoundFurther { found, best_log10 } = of_others;
         }
         let failure = if search.is_interrupted() {
             SearchFailure::Interrupted
@@ -330,11 +326,13 @@ impl Others {
         let windows = windows.cut(whole.field);
         let of_middle = middle(windows, whole);
         let of = move |field| Problem { field, ..whole };
-        let brightest = other_fields.and_then(|other_fields| other_fields.brightest());
-        let of_brightest = brightest.map(|[few, many]| {
-            let of_few = FurtherSearch::new(of(few), SearchPlan::at_once());
-            let of_middle = middle(windows_of_brightest.cut(many), of(many));
-            std::iter::once(of_few).chain(of_middle)
+        let few = other_fields.and_then(|other_fields| other_fields.few_brightest());
+        let few = few.map(|few| FurtherSearch::new(of(few), SearchPlan::at_once()));
+        // Many are measured only where the few do not tell it.
+        let many = std::iter::once_with(move || {
+            let many = other_fields.and_then(|other_fields| other_fields.many_brightest());
+            let of_middle = many.map(|many| middle(windows_of_brightest.cut(many), of(many)));
+            of_middle.into_iter().flatten()
         });
         let coarse = other_fields.into_iter().flat_map(move |other_fields| {
             let fields = (0..other_fields.resolutions())
@@ -361,7 +359,8 @@ impl Others {
             };
             FurtherSearch::new(problem, SearchPlan::tier(effort))
         });
-        let at_low_cost = of_brightest.into_iter().flatten().chain(of_middle);
+        let of_brightest = few.into_iter().chain(many.flatten());
+        let at_low_cost = of_brightest.chain(of_middle);
         let of_stars = coarse.chain(of_whole).chain(thinned);
         at_low_cost.chain(of_stars).chain(windows).chain(tiers)
     }
@@ -412,8 +411,7 @@ struct Further<'a, 'p> {
     priors: &'p Priors,
 }
 
-/// What was found in some of them, and the lowest log10 of the false-alarm probabilities.
-#[derive(Default)]
+/// What was found in some of them, and the lowest log10 of the false-alarm probabilities, those before among them.
 struct FoundFurther {
     found: Option<FoundHypothesis>,
     best_log10: Option<f64>,
@@ -426,7 +424,10 @@ impl<'a> Further<'a, '_> {
         mut search: TriangleSearch<'a>,
         choices: impl Iterator<Item = FurtherSearch<'a>>,
     ) -> (TriangleSearch<'a>, FoundFurther) {
-        let mut of_all = FoundFurther::default();
+        let mut of_all = FoundFurther {
+            found: None,
+            best_log10: search.best_log10_false_alarm(),
+        };
         for choice in choices {
             let found;
             (search, found) = self.search_one(search, &choice);

@@ -12,7 +12,7 @@ use crate::detect::{
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{ObservedStar, OtherFields, StarField};
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
 
 /// Sides of the blocks of pixels that are averaged, the cheapest first.
 const FACTORS: [usize; 2] = [4, 2];
@@ -30,7 +30,9 @@ pub(super) struct OtherStars<'a> {
     /// frame is detected with buffers of its own.
     detector: &'a detect::Workspace,
     places: StarPlaces,
-    brightest: OnceCell<Option<[StarField; 2]>>,
+    /// What stands out in single pixels; none where it could not be looked for.
+    looked: OnceCell<Option<RefCell<detect::Workspace>>>,
+    brightest: [OnceCell<Option<StarField>>; TRIED_STARS.len()],
     coarse: [OnceCell<Option<StarField>>; FACTORS.len()],
 }
 
@@ -40,28 +42,30 @@ impl<'a> OtherStars<'a> {
             frame,
             detector,
             places,
-            brightest: OnceCell::new(),
+            looked: OnceCell::new(),
+            brightest: Default::default(),
             coarse: Default::default(),
         }
     }
 
-    /// The stars that stand out in single pixels.
-    fn detect_brightest(&self) -> Option<[StarField; 2]> {
-        let Self {
-            frame,
-            detector,
-            places,
-            ..
-        } = self;
-        let (config, mut detector) = (DetectConfig::default(), detector.emptied());
-        look_for_brightest(frame, &config, &mut detector).ok()?;
-        let mut field_of = |count| {
-            let mut stars = Detections::default();
-            measure_brightest_into(frame, &config, count, &mut detector, &mut stars).ok()?;
-            Some(star_field(frame, &stars, *places))
-        };
-        let [few, many] = TRIED_STARS;
-        Some([field_of(few)?, field_of(many)?])
+    /// The brightest stars that stand out in single pixels, in one of the numbers that are tried.
+    fn brightest(&self, number: usize) -> Option<&StarField> {
+        if self.detector.is_interrupted() {
+            return None;
+        }
+        let brightest = self.brightest[number].get_or_init(|| {
+            let (config, mut stars) = (DetectConfig::default(), Detections::default());
+            let look = || {
+                let mut detector = self.detector.emptied();
+                let looked = look_for_brightest(self.frame, &config, &mut detector);
+                looked.ok().map(|()| RefCell::new(detector))
+            };
+            let detector = &mut *self.looked.get_or_init(look).as_ref()?.borrow_mut();
+            let count = TRIED_STARS[number];
+            measure_brightest_into(self.frame, &config, count, detector, &mut stars).ok()?;
+            Some(star_field(self.frame, &stars, self.places))
+        });
+        brightest.as_ref()
     }
 
     /// The stars of the frame in blocks of `factor` × `factor` pixels, in pixels of the whole frame.
@@ -104,12 +108,12 @@ impl<'a> OtherStars<'a> {
 }
 
 impl OtherFields for OtherStars<'_> {
-    fn brightest(&self) -> Option<[&StarField; 2]> {
-        if self.detector.is_interrupted() {
-            return None;
-        }
-        let brightest = self.brightest.get_or_init(|| self.detect_brightest());
-        brightest.as_ref().map(|fields| fields.each_ref())
+    fn few_brightest(&self) -> Option<&StarField> {
+        self.brightest(0)
+    }
+
+    fn many_brightest(&self) -> Option<&StarField> {
+        self.brightest(1)
     }
 
     fn resolutions(&self) -> usize {

@@ -31,8 +31,8 @@ impl StarSize {
 }
 
 /// Whether the brightest pixel at a peak did not get its light through a lens whose spots leave at least
-/// `least_beside` of the light of a pixel beside it: a hot pixel, a cosmic ray. Charge that ran from a saturated star along a
-/// column is sharp in one direction.
+/// `least_beside` of the light of a pixel beside it: a hot pixel, a cosmic ray. Charge that ran from a saturated
+/// star along a column is sharp in one direction.
 pub(super) fn is_too_sharp(
     maps: &FrameMaps<'_>,
     noise: &NoiseModel,
