@@ -55,6 +55,7 @@
 //! | [`centroids`] | what does a list of centroids hold |
 //! | [`solve`] | what does a frame show: the stages in order |
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
+//! | `annotate` | what is in a frame: names by the pose, constellations, one sentence |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
 //! | `store` | results of many frames: runs that can be resumed, and their tables |
@@ -71,6 +72,7 @@
 // The same frame gives the same bytes on every system.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod annotate;
 #[doc(hidden)]
 pub mod base;
 pub mod calibration;

@@ -68,7 +68,9 @@ impl Solved {
                 shown
             });
             let options = OverlayOptions::default();
-            page::html(&self.report(), &self.solution, shown.as_ref(), &options).map_err(exception)
+            let catalog = self.indexed.catalog();
+            page::html(&self.report(), &self.solution, catalog, shown.as_ref(), &options)
+                .map_err(exception)
         })
     }
 

@@ -44,6 +44,9 @@ class Drawn(Protocol):
     def star_columns(self) -> Columns: ...
 
     @property
+    def annotations(self) -> list[dict[str, Any]]: ...
+
+    @property
     def _is_bottom_up(self) -> bool: ...
 
     def __bool__(self) -> bool: ...
@@ -71,6 +74,8 @@ def draw(
     if picture is not None:
         _show(ax, *picture)
     _mark(ax, result, rings, names)
+    if rings != "none":
+        _annotate(ax, result)
     ax.set_xlim(-0.5, columns - 0.5)
     ax.set_ylim(*((-0.5, rows - 0.5) if result._is_bottom_up else (rows - 0.5, -0.5)))
     ax.set_aspect("equal")
@@ -83,6 +88,23 @@ def draw(
     # Dollars in a name are no formula.
     ax.set_title(title, fontsize=8, parse_math=False)
     return ax
+
+
+def _annotate(ax: Axes, result: Drawn) -> None:
+    """Write constellations, and the stars that are at their place and not measured."""
+    from matplotlib.patheffects import withStroke
+
+    outline = [withStroke(linewidth=2.0, foreground="black")]
+    look: dict[str, Any] = {"clip_on": True, "parse_math": False, "path_effects": outline}
+    for shown in result.annotations:
+        place, label = (shown["x"], shown["y"]), shown["label"]
+        if shown["kind"] == "constellation":
+            ax.annotate(label, place, ha="center", va="center", color="#bbc3df", fontsize=10, **look)
+        elif shown["kind"] == "star" and shown["why"] is not None:
+            ring = {"facecolors": "none", "edgecolors": "#96e1cd", "linestyles": "dashed"}
+            ax.scatter(*place, s=150.0, marker="o", linewidths=1.0, **ring)
+            offset = {"xytext": (8, 8), "textcoords": "offset points"}
+            ax.annotate(label, place, color="#c9efe4", fontsize=8, **offset, **look)
 
 
 def _show(ax: Axes, levels: NDArray[np.uint8], shape: tuple[int, int]) -> None:

@@ -146,6 +146,7 @@ class Result(Attitude):
         if self:
             attitude, optics, match = report["attitude"], report["optics"], report["match"]
             rows += [
+                ("shows", str(self.sentence)),
                 ("centre", f"{attitude['ra_deg']:.5f}°, {attitude['dec_deg']:+.5f}°"),
                 ("field", f"{optics['fov_x_deg']:.3f}° by {optics['fov_y_deg']:.3f}°"),
                 ("stars", f"{match['matched']} of {match['detected']} named"),
@@ -205,6 +206,28 @@ class Result(Attitude):
     def remedies(self) -> list[str]:
         """Names of the options that may help where the stars are not identified."""
         return self._report["remedies"]  # type: ignore[no-any-return]
+
+    @property
+    def sentence(self) -> str | None:
+        """What the frame shows: constellations, famous objects, the size of the field; ``None`` if not identified."""
+        return self._report["sentence"]  # type: ignore[no-any-return]
+
+    @property
+    def constellations(self) -> list[dict[str, Any]]:
+        """The constellations in the frame, largest share first: the `constellations` of the JSON."""
+        return self._report["constellations"]  # type: ignore[no-any-return]
+
+    @property
+    def annotations(self) -> list[dict[str, Any]]:
+        """What has a name in the frame, by its pose: the `annotations` of the JSON, pixels as in `stars`.
+
+        Bright stars are among them whether they were measured or not; ``why`` says why not.
+        """
+        height = self._report["height"]
+        found = [dict(shown) for shown in self._report["annotations"]]
+        for shown in found if self._is_bottom_up else []:
+            shown["y"] = height - 1 - shown["y"]
+        return found
 
     @property
     def notes(self) -> list[str]:

@@ -43,6 +43,8 @@
 //! Myers, Sande, Miller, Warren, Tracewell 2001, SKY2000 Catalog, Version 4 (CDS V/109); 2006,
 //! Version 5 (CDS V/145); NASA Goddard Space Flight Center, Flight Dynamics Division.
 
+mod bayer;
+pub(crate) mod boundaries;
 mod compact;
 mod contents;
 mod error;

@@ -1,4 +1,4 @@
-//! What is in the sky beside stars: constellations and the brightest clusters, nebulae and galaxies.
+//! What is in the sky beside stars: figures of constellations, and the brightest clusters, nebulae and galaxies.
 //!
 //! Positions are ICRS. `assets/README.md` says where the tables come from.
 
@@ -11,9 +11,9 @@ const DEEP_SKY: &str = include_str!("../../assets/deep-sky.csv");
 
 /// A constellation; Serpens has two entries.
 pub(crate) struct Constellation {
+    /// The abbreviation of the IAU, as in `Ori`.
+    pub(crate) abbreviation: &'static str,
     pub(crate) name: &'static str,
-    /// Where its name is written.
-    pub(crate) middle: UnitVector<Icrs>,
     /// The lines of its figure, from star to star.
     pub(crate) lines: Vec<Vec<UnitVector<Icrs>>>,
 }
@@ -22,6 +22,9 @@ pub(crate) struct Constellation {
 pub(crate) struct DeepSkyObject {
     /// As in `M 42` or `NGC 869`.
     pub(crate) designation: &'static str,
+    /// The name that people use, as in `Orion Nebula`; empty where there is none.
+    pub(crate) name: &'static str,
+    pub(crate) v_mag: f64,
     pub(crate) direction: UnitVector<Icrs>,
     /// Half of its longer side; 0 where this is unknown.
     pub(crate) radius_rad: f64,
@@ -49,7 +52,7 @@ fn direction(ra_deg: &str, dec_deg: &str) -> Option<UnitVector<Icrs>> {
 }
 
 fn constellation(cells: Vec<&'static str>) -> Option<Constellation> {
-    let [_, name, ra_deg, dec_deg, lines] = cells[..] else {
+    let [abbreviation, name, _, _, lines] = cells[..] else {
         return None;
     };
     let line = |text: &str| {
@@ -60,18 +63,20 @@ fn constellation(cells: Vec<&'static str>) -> Option<Constellation> {
             .collect()
     };
     Some(Constellation {
+        abbreviation,
         name,
-        middle: direction(ra_deg, dec_deg)?,
         lines: lines.split(';').map(line).collect(),
     })
 }
 
 fn deep_sky_object(cells: Vec<&'static str>) -> Option<DeepSkyObject> {
-    let [designation, _, _, _, size_arcmin, ra_deg, dec_deg] = cells[..] else {
+    let [designation, name, _, v_mag, size_arcmin, ra_deg, dec_deg] = cells[..] else {
         return None;
     };
     Some(DeepSkyObject {
         designation,
+        name,
+        v_mag: v_mag.parse().ok()?,
         direction: direction(ra_deg, dec_deg)?,
         radius_rad: size_arcmin.parse::<f64>().ok()? / 2.0 / 60.0 * RAD_PER_DEG,
     })

@@ -3,7 +3,7 @@
 use super::contents::Contents;
 use super::star::J2000_YEAR;
 use super::{
-    CatalogError, CompactError, Star, StarId, StarIndex, StarNumbers, compact, proper_names,
+    CatalogError, CompactError, Star, StarId, StarIndex, StarNumbers, bayer, compact, proper_names,
 };
 use crate::base::files;
 use std::path::Path;
@@ -140,6 +140,13 @@ impl Catalog {
             (Some(proper), Some(name)) if proper != name => Some(format!("{proper} ({name})")),
             (proper, name) => proper.or(name).map(str::to_owned),
         }
+    }
+
+    /// The name of a star in a picture: its proper name, else its Bayer letter in Greek or its Flamsteed
+    /// number, as in `Rigel`, `α CMi` and `24 Tau`.
+    pub(crate) fn short_name(&self, star: StarIndex) -> Option<String> {
+        let proper = self.proper_name(star).map(str::to_owned);
+        proper.or_else(|| self.name_of(star).map(bayer::short))
     }
 
     /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`,

@@ -12,7 +12,8 @@ use super::frame_report::{
 };
 use super::sky::SkyReport;
 use super::stars::{self, ReportedPointing};
-use super::{bodies, reason, trails};
+use super::{annotations, bodies, reason, trails};
+use crate::annotate::Scene;
 use crate::base::clock::hours_of;
 use crate::base::coords::{Camera, Icrs, Rotation};
 use crate::base::format::{
@@ -82,6 +83,9 @@ impl FrameReport {
             sky: solution.sky.as_ref().map(SkyReport::new),
             calibration: solution.calibration.as_ref().map(calibration),
             background: background(solution.background.as_ref()),
+            sentence: None,
+            constellations: Vec::new(),
+            annotations: Vec::new(),
             bodies: Vec::new(),
             trails: trails::reports(solution),
             stars: solution.sources.iter().map(stars::detection).collect(),
@@ -98,6 +102,9 @@ impl FrameReport {
                 // The faintest of the brightest stars says nothing.
                 report.magnitude = report.magnitude.take().filter(|_| !solution.attitude_only);
                 bodies::add_to(&mut report, &solution.bodies, identification);
+                if let Some(scene) = Scene::of(solution, catalog) {
+                    annotations::add_to(&mut report, scene, catalog);
+                }
             }
         }
         if let Some(comparison) = &solution.comparison {

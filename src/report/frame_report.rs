@@ -1,5 +1,6 @@
 //! The report of a frame: its fields, as JSON has them.
 
+use super::annotations::{AnnotationReport, ConstellationReport};
 use super::sky::SkyReport;
 use crate::base::coords::PixelPoint;
 use crate::base::format::json_escaped;
@@ -44,6 +45,8 @@ pub struct FrameReport {
     pub reason: Option<String>,
     /// Code of the reason, see [`Reason::code`](crate::solve::Reason::code).
     pub reason_code: Option<&'static str>,
+    /// What the frame shows, in one sentence, where it is identified.
+    pub sentence: Option<String>,
     /// Names of the options that may help where they are not identified.
     pub remedies: Vec<Remedy>,
     /// The attitude of the camera.
@@ -70,6 +73,11 @@ pub struct FrameReport {
     pub background: BackgroundReport,
     /// The Moon and the planets in the frame, where its date is known.
     pub bodies: Vec<BodyReport>,
+    /// The constellations in the frame, largest share first.
+    pub constellations: Vec<ConstellationReport>,
+    /// What has a name in the frame, by its pose: constellations, bodies, deep-sky objects, radiants, and the
+    /// bright stars, whether they are measured or not.
+    pub annotations: Vec<AnnotationReport>,
     /// Satellites, aeroplanes and meteors, where they were searched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trails: Option<Vec<TrailReport>>,

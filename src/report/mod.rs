@@ -11,6 +11,7 @@
 //! that is not finite is `null` in JSON and an empty field in CSV. Fields may be added to the JSON;
 //! none is renamed or dropped without a new [`SCHEMA`].
 
+mod annotations;
 mod bodies;
 mod build;
 mod digits;
@@ -24,8 +25,6 @@ pub mod page;
 mod prediction;
 mod reason;
 pub mod regions;
-#[cfg(test)]
-mod sample;
 mod sky;
 pub mod sky_figure;
 mod sky_text;
@@ -39,6 +38,7 @@ mod track;
 mod trails;
 pub mod wcs;
 
+pub use annotations::{AnnotationReport, ConstellationReport};
 pub use frame_report::{
     ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
     CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,

@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use crate::base::coords::{PixelPoint, UnitVector};
     use crate::base::units::RAD_PER_DEG;
-    use crate::report::sample;
+    use crate::solve::sample;
     use crate::solve::{Outcome, Source};
 
     fn text_of(reason: Reason, detections: usize) -> String {

@@ -44,7 +44,7 @@ mod tests {
     use crate::catalog::Catalog;
     use crate::frame::RowOrder;
     use crate::identify::SearchFailure;
-    use crate::report::sample;
+    use crate::solve::sample;
     use crate::solve::{Outcome, Reason};
 
     #[test]

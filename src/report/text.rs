@@ -32,11 +32,12 @@ pub struct TextOptions {
 impl FrameReport {
     /// The report as text; every line has its end.
     pub fn to_text(&self, options: TextOptions) -> String {
-        let mut lines = vec![format!(
-            "{}  {} × {} px",
-            self.frame, self.width, self.height
-        )];
-        lines.extend(self.outcome_lines(options.option_names));
+        let mut lines = self.headline(options.option_names);
+        lines.extend(self.matched.iter().map(identified_line));
+        lines.push(labelled(
+            "picture",
+            &format!("{} × {} px", self.width, self.height),
+        ));
         lines.extend(self.attitude.iter().flat_map(attitude_lines));
         lines.extend(self.optics.iter().flat_map(optics_lines));
         lines.extend(self.matched.iter().map(residual_line));
@@ -68,23 +69,21 @@ impl FrameReport {
         lines.iter().map(|line| printable(line) + "\n").collect()
     }
 
-    fn outcome_lines(&self, names: OptionNames) -> Vec<String> {
-        let text = match (&self.matched, &self.reason) {
-            (Some(matched), _) => format!(
-                "identified: {} of {}; false-alarm probability 10^{:.0}",
-                matched.matched,
-                counted(matched.detected, "detection"),
-                matched.log10_false_alarm,
-            ),
+    /// What the frame shows, or why it is not identified.
+    fn headline(&self, names: OptionNames) -> Vec<String> {
+        let text = match (&self.sentence, &self.reason) {
+            (Some(sentence), _) => sentence.clone(),
             (None, Some(reason)) => {
                 format!("not identified: {reason}{}", names.see(&self.remedies))
             }
             (None, None) => "not identified".to_owned(),
         };
-        wrap(&text, LINE_WIDTH - 2)
-            .into_iter()
-            .map(|line| format!("  {line}"))
-            .collect()
+        let name = format!("{}: ", self.frame);
+        let mut lines = wrap(&text, LINE_WIDTH - 2, name.chars().count()).into_iter();
+        let first = lines.next().unwrap_or_default();
+        let others = lines.map(|line| format!("  {line}"));
+        let first = (name + &first).trim_end().to_owned();
+        std::iter::once(first).chain(others).collect()
     }
 
     fn faintest_line(&self, magnitude: &MagnitudeReport) -> String {
@@ -319,6 +318,16 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
     ]
 }
 
+fn identified_line(matched: &MatchReport) -> String {
+    let text = format!(
+        "{} of {}; false-alarm probability 10^{:.0}",
+        matched.matched,
+        counted(matched.detected, "detection"),
+        matched.log10_false_alarm,
+    );
+    labelled("identified", &text)
+}
+
 fn residual_line(matched: &MatchReport) -> String {
     let text = format!(
         "{:.3} px, {} root mean square",
@@ -389,17 +398,24 @@ pub(super) fn labelled(label: &str, text: &str) -> String {
     format!("  {label:<LABEL_WIDTH$}{text}")
 }
 
-/// Wraps `text` at blanks into lines of at most `width` characters, except for longer words.
-fn wrap(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
+/// Wraps `text` at blanks into lines of at most `width` characters, except for longer words; `lead` of the first
+/// line are taken.
+fn wrap(text: &str, width: usize, lead: usize) -> Vec<String> {
+    let mut lines = Vec::new();
+    let (mut line, mut taken) = (String::new(), lead);
     for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
+        let length = word.chars().count();
+        if taken + 1 + length > width && taken > 0 {
+            lines.push(std::mem::take(&mut line));
+            taken = 0;
         }
+        if !line.is_empty() {
+            line.push(' ');
+            taken += 1;
+        }
+        line.push_str(word);
+        taken += length;
     }
+    lines.push(line);
     lines
 }

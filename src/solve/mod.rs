@@ -28,6 +28,8 @@ mod pointing;
 mod pointing_buffers;
 mod prepared;
 mod raw_color;
+#[cfg(test)]
+pub(crate) mod sample;
 mod solution;
 mod solve_list;
 mod solved;

@@ -8,7 +8,7 @@ use super::source::Source;
 use super::stopwatch::Timing;
 use crate::calibration::Applied;
 use crate::catalog::StarIndex;
-use crate::detect::Trail;
+use crate::detect::{SkyArea, Trail};
 use crate::ephemeris::observer::{Observation, Site};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
@@ -49,6 +49,8 @@ pub struct Solution {
     pub sources: Vec<Source>,
     /// The sky background; a list of centroids has none.
     pub background: Option<Background>,
+    /// The part of the frame that shows the sky; `None` where all does, or of a list of centroids.
+    pub sky_area: Option<SkyArea>,
     /// Whether only attitude and optics were wanted, from the brightest stars.
     pub attitude_only: bool,
     /// Which directions the reported attitude refers to.

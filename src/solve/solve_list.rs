@@ -133,6 +133,7 @@ pub fn solve_centroids(
         site: priors.site,
         exposure_s: priors.exposure_s,
         spot_sigma_px: None,
+        sky_area: None,
         sources,
         background: None,
         attitude_only: context.attitude_only,

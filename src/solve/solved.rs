@@ -231,6 +231,7 @@ impl SolvedFrame<'_> {
                     .as_ref()
                     .map_or(1.0, SkyArea::share),
             }),
+            sky_area: self.detections.sky_area,
             observation: self.observation,
             place_time: self.place_time,
             site: self.priors.site,

@@ -502,6 +502,7 @@ fn not_in_time(
         site: priors.site,
         exposure_s: priors.exposure_s,
         spot_sigma_px: None,
+        sky_area: None,
         notes: Note::of_file(&frame.metadata).collect(),
         sources: Vec::new(),
         background: None,

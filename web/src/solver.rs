@@ -185,7 +185,7 @@ impl Solved {
     pub fn html(&self) -> Result<String, JsError> {
         let options = OverlayOptions::default();
         let draw =
-            |shown: &Shown<'_>| page::html(&self.report, &self.solution, Some(shown), &options);
+            |shown: &Shown<'_>| page::html(&self.report, &self.solution, self.catalog, Some(shown), &options);
         self.shown(draw).map_err(told)
     }
 
@@ -195,7 +195,7 @@ impl Solved {
     /// None that occur.
     pub fn view(&self) -> Result<Vec<String>, JsError> {
         let options = OverlayOptions::default();
-        let draw = |shown: &Shown<'_>| page::view(&self.report, &self.solution, shown, &options);
+        let draw = |shown: &Shown<'_>| page::view(&self.report, &self.solution, self.catalog, shown, &options);
         let view = self.shown(draw).map_err(told)?;
         Ok(vec![view.html, view.data])
     }

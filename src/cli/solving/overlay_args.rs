@@ -1,13 +1,15 @@
 //! How overlays are drawn.
 
 use clap::{Args, ValueEnum};
-use starpipe::report::overlay::{LabelKind, OverlayFormat, OverlayOptions, Rings, Stretch};
+use starpipe::report::overlay::{
+    LabelKind, OverlayFormat, OverlayOptions, PictureCut, Rings, Stretch,
+};
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Picture")]
 pub(super) struct OverlayArgs {
     /// How the picture shows the frame
-    #[arg(long, value_enum, default_value_t = StretchOption::Soft, requires = "out")]
+    #[arg(long, value_enum, default_value_t = StretchOption::Auto, requires = "out")]
     stretch: StretchOption,
     /// Which detections are marked
     #[arg(long, value_enum, default_value_t = RingsOption::Named, requires = "out")]
@@ -21,12 +23,22 @@ pub(super) struct OverlayArgs {
         value_enum,
         value_name = "WHAT",
         value_delimiter = ',',
+        default_value = "constellations,deep-sky",
         requires = "out"
     )]
     draw: Vec<SkyOption>,
     /// Width of the picture, in pixels [default: that of the frame, or a whole fraction or multiple of it]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=20_000), requires = "out")]
     overlay_width: Option<u32>,
+    /// A cut for sharing, with a caption: 1080 × 1080 or 1080 × 1350 pixels
+    #[arg(
+        long,
+        value_enum,
+        value_name = "SIZE",
+        conflicts_with = "overlay_width",
+        requires = "out"
+    )]
+    overlay_for: Option<CutOption>,
     /// Kind of the picture's file: FRAME.png, FRAME.jpg or FRAME.svg
     #[arg(long, value_enum, default_value_t = FormatOption::Png, requires = "out")]
     overlay_format: FormatOption,
@@ -35,6 +47,8 @@ pub(super) struct OverlayArgs {
 /// How an overlay shows the frame.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum StretchOption {
+    /// Photographs of 8 bits as they are, linear data (FITS, 16 bits) with a dark sky brightened
+    Auto,
     /// In proportion to its levels
     None,
     /// With a dark sky brightened
@@ -68,6 +82,8 @@ enum LabelOption {
 /// What else of the sky is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum SkyOption {
+    /// Nothing
+    None,
     /// Figures and names of the constellations
     Constellations,
     /// The brightest clusters, nebulae and galaxies
@@ -76,6 +92,15 @@ enum SkyOption {
     Grid,
     /// Azimuth and altitude, where site and time are known
     AltazGrid,
+}
+
+/// Cuts for sharing.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CutOption {
+    /// 1080 × 1080 pixels
+    Square,
+    /// 1080 × 1350 pixels
+    Story,
 }
 
 /// Kinds of files.
@@ -94,6 +119,7 @@ impl OverlayArgs {
     pub(super) fn options(&self) -> OverlayOptions {
         let mut options = OverlayOptions::default();
         options.stretch = match self.stretch {
+            StretchOption::Auto => Stretch::Auto,
             StretchOption::None => Stretch::None,
             StretchOption::Soft => Stretch::Soft,
             StretchOption::Hard => Stretch::Hard,
@@ -114,6 +140,10 @@ impl OverlayArgs {
         options.sky.equatorial_grid = draws(SkyOption::Grid);
         options.sky.horizontal_grid = draws(SkyOption::AltazGrid);
         options.width_px = self.overlay_width;
+        options.cut = self.overlay_for.map(|cut| match cut {
+            CutOption::Square => PictureCut::Square,
+            CutOption::Story => PictureCut::Story,
+        });
         options.format = match self.overlay_format {
             FormatOption::Png => OverlayFormat::Png,
             FormatOption::Jpg => OverlayFormat::Jpeg,

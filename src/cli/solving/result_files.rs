@@ -134,7 +134,7 @@ impl<'a> ResultFiles<'a> {
             Ok((of.path(overlay.format.extension()), picture))
         });
         let page = self.options.html.then(|| {
-            let page = page::html(report, &solved.solution, shown.as_ref(), &overlay)?;
+            let page = page::html(report, &solved.solution, catalog, shown.as_ref(), &overlay)?;
             Ok((of.path("html"), page.into_bytes()))
         });
         let sky = sky_figure::svg(report);

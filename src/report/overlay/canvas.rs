@@ -15,6 +15,9 @@ impl Rgb {
     }
 }
 
+/// Height of the strip below a picture, in units.
+pub(super) const STRIP_HEIGHT: f32 = 76.0;
+
 /// A drawing over a picture. Sizes of strokes and letters are in units that suit the picture's size.
 pub(super) struct Canvas {
     pub(super) size: Size,

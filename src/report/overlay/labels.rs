@@ -1,9 +1,10 @@
-//! Places names, brightest stars first, where they cover neither another name nor what is marked.
+//! Places names, the most famous first, where they cover neither another name nor what is marked.
 
 use super::mark::Mark;
 use super::names::StarLabel;
 use super::options::Rings;
 use crate::report::figure::text_width;
+use std::f32::consts::TAU;
 use std::ptr;
 
 /// Size of the letters, in units of strokes.
@@ -44,29 +45,64 @@ impl Mark {
     }
 }
 
-/// Where names may still be written.
+/// Where names may still be written, and what is marked there.
 pub(super) struct Room<'a> {
-    marked: Vec<&'a Mark>,
+    /// The marks that are shown.
+    shown: Vec<&'a Mark>,
+    /// Those that are to have a name, first those that get a place first.
+    named: Vec<&'a Mark>,
+    rings: Rings,
     taken: Vec<Rectangle>,
     image: [f32; 2],
     unit: f32,
 }
 
 impl<'a> Room<'a> {
-    /// A picture of `image` pixels, all of it free.
-    #[cfg(feature = "page")]
-    pub(super) fn all(image: [f32; 2], unit: f32) -> Self {
+    /// A picture of `image` pixels with `marks`, of which some are to have names.
+    pub(super) fn of(marks: &'a [Mark], rings: Rings, image: [f32; 2], unit: f32) -> Self {
+        let named = first_named(marks, rings, image, unit);
+        let shown = match rings {
+            Rings::None => Vec::new(),
+            Rings::Named if !named.is_empty() => named.clone(),
+            Rings::Named | Rings::All => marks.iter().collect(),
+        };
         Self {
-            marked: Vec::new(),
+            shown,
+            named,
+            rings,
             taken: Vec::new(),
             image,
             unit,
         }
     }
 
+    /// A picture of `image` pixels, all of it free.
+    #[cfg(feature = "page")]
+    pub(super) fn all(image: [f32; 2], unit: f32) -> Self {
+        Self::of(&[], Rings::None, image, unit)
+    }
+
     /// The marks that are shown.
     pub(super) fn marked(&self) -> &[&'a Mark] {
-        &self.marked
+        &self.shown
+    }
+
+    /// Places the names of the marks. With [`Rings::Named`], a mark whose name finds no room is not shown.
+    pub(super) fn place_names(&mut self) -> Vec<Label> {
+        let mut labels = Vec::new();
+        for mark in self.named.clone() {
+            match label_of(mark, self) {
+                Some((rectangle, label)) => {
+                    self.taken.push(rectangle);
+                    labels.push(label);
+                }
+                None if self.rings == Rings::Named => {
+                    self.shown.retain(|other| !ptr::eq(*other, mark));
+                }
+                None => {}
+            }
+        }
+        labels
     }
 
     /// A free place beside a circle, for the start of the baseline of `text` in letters of `size` units.
@@ -79,17 +115,39 @@ impl<'a> Room<'a> {
     ) -> Option<[f32; 2]> {
         let gap = GAP * self.unit;
         let sides = candidates(center, radius + gap, self.extent(text, size), self.unit);
-        self.take(&sides)
+        let place = self.first_free(&sides, &self.shown)?;
+        Some(self.take(place))
     }
 
-    /// The same around a point, if it is free.
-    pub(super) fn around(&mut self, text: &str, [x, y]: [f32; 2], size: f32) -> Option<[f32; 2]> {
+    /// The same for a name that is to stand around a point, or near it, within the picture. It may cover marks
+    /// without a name where there is no other room.
+    pub(super) fn near(&mut self, text: &str, middle: [f32; 2], size: f32) -> Option<[f32; 2]> {
+        /// Distances from the point, in heights of letters.
+        const AWAY: [f32; 9] = [0.0, 1.0, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0, 13.0];
+        const DIRECTIONS: u16 = 12;
         let [width, height] = self.extent(text, size);
         let (right, down) = (
             width / 2.0 + MARGIN * self.unit,
             height / 2.0 + MARGIN * self.unit,
         );
-        self.take(&[[x - right, y - down, x + right, y + down]])
+        let [right_end, bottom_end] = [self.image[0] - right, self.image[1] - down];
+        if right > right_end || down > bottom_end {
+            return None;
+        }
+        let places = AWAY.into_iter().flat_map(|away| {
+            let directions = if away == 0.0 { 1 } else { DIRECTIONS };
+            (0..directions).map(move |direction| {
+                let (sin, cos) = libm::sincosf(f32::from(direction) * TAU / f32::from(DIRECTIONS));
+                let away = away * height;
+                let x = (middle[0] + away * cos).clamp(right, right_end);
+                let y = (middle[1] + away * sin).clamp(down, bottom_end);
+                [x - right, y - down, x + right, y + down]
+            })
+        });
+        let places: Vec<Rectangle> = places.collect();
+        let free = self.first_free(&places, &self.shown);
+        let place = free.or_else(|| self.first_free(&places, &self.named))?;
+        Some(self.take(place))
     }
 
     fn extent(&self, text: &str, size: f32) -> [f32; 2] {
@@ -99,89 +157,51 @@ impl<'a> Room<'a> {
         ]
     }
 
-    fn take(&mut self, candidates: &[Rectangle]) -> Option<[f32; 2]> {
-        let is_free =
-            |rectangle: &&Rectangle| is_free(rectangle, &self.marked, &self.taken, self.image);
-        let rectangle = *candidates.iter().find(is_free)?;
-        self.taken.push(rectangle);
-        Some(baseline(&rectangle, self.unit))
+    /// The first of these places that covers neither a name nor one of `marks`.
+    fn first_free(&self, places: &[Rectangle], marks: &[&Mark]) -> Option<Rectangle> {
+        let is_free = |place: &&Rectangle| is_free(place, marks, &self.taken, self.image);
+        places.iter().find(is_free).copied()
+    }
+
+    /// Takes a place; returns where the baseline begins.
+    fn take(&mut self, place: Rectangle) -> [f32; 2] {
+        self.taken.push(place);
+        baseline(&place, self.unit)
     }
 }
 
-/// Places the names of `marks`, brightest first, on a picture of `image` pixels; returns the marks that are
-/// shown with it, and where there is room for more.
-pub(super) fn place(
-    marks: &[Mark],
-    rings: Rings,
-    image: [f32; 2],
-    unit: f32,
-) -> (Vec<Label>, Room<'_>) {
-    let named = brightest_named(marks, rings, image, unit);
-    let mut shown: Vec<&Mark> = match rings {
-        Rings::None => Vec::new(),
-        Rings::Named if !named.is_empty() => named.clone(),
-        Rings::Named | Rings::All => marks.iter().collect(),
-    };
-    let mut taken: Vec<Rectangle> = Vec::new();
-    let mut labels = Vec::new();
-    for mark in named {
-        match label_of(mark, &shown, &taken, image, unit) {
-            Some((rectangle, label)) => {
-                taken.push(rectangle);
-                labels.push(label);
-            }
-            // What is marked has a name.
-            None if rings == Rings::Named => shown.retain(|other| !ptr::eq(*other, mark)),
-            None => {}
-        }
-    }
-    let room = Room {
-        marked: shown,
-        taken,
-        image,
-        unit,
-    };
-    (labels, room)
-}
-
-/// The marks with the brightest stars, brightest first: as many as there is room for names. Stars with a
-/// number alone are among them where all are marked, or where few have a name.
-fn brightest_named(marks: &[Mark], rings: Rings, image: [f32; 2], unit: f32) -> Vec<&Mark> {
+/// The marks with the most famous and brightest stars: as many as there is room for names. Stars with a number
+/// alone are among them where all are marked, or where few have a name.
+fn first_named(marks: &[Mark], rings: Rings, image: [f32; 2], unit: f32) -> Vec<&Mark> {
     /// Smallest area per name, in square units: more names are unreadable.
     const AREA_PER_LABEL: f32 = 9000.0;
     /// Fewer names than this are few.
     const ENOUGH_NAMES: usize = 5;
-    let v_mag = |mark: &Mark| {
+    let rank = |mark: &Mark| {
         mark.label
             .as_ref()
-            .map_or(f32::INFINITY, |label| label.v_mag)
+            .map_or(f32::INFINITY, |label| label.rank)
     };
     let has_name = |mark: &&Mark| mark.label.as_ref().is_some_and(|label| label.has_name);
     let mut named: Vec<&Mark> = marks.iter().filter(|mark| mark.label.is_some()).collect();
     if rings == Rings::Named && named.iter().filter(|mark| has_name(mark)).count() >= ENOUGH_NAMES {
         named.retain(has_name);
     }
-    named.sort_by(|a, b| v_mag(a).total_cmp(&v_mag(b)));
+    named.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     named.truncate((image[0] * image[1] / (AREA_PER_LABEL * unit * unit)).ceil() as usize);
     named
 }
 
 /// The name of a mark, and the room that it takes, where there is any.
-fn label_of(
-    mark: &Mark,
-    shown: &[&Mark],
-    taken: &[Rectangle],
-    image: [f32; 2],
-    unit: f32,
-) -> Option<(Rectangle, Label)> {
+fn label_of(mark: &Mark, room: &Room<'_>) -> Option<(Rectangle, Label)> {
     /// Distance of a name from its ring where there is no room beside it, with a line to the ring.
     const FAR_GAP: f32 = 16.0;
     let StarLabel { text, .. } = mark.label.as_ref()?;
-    let size = [text_width(text, SIZE * unit), CAPITALS * SIZE * unit];
+    let (size, unit) = (room.extent(text, SIZE), room.unit);
     let find = |gap: f32| {
         let away = mark.radius + gap * unit;
-        let mut candidates = candidates([mark.x, mark.y], away, size, unit).into_iter();
-        candidates.find(|rectangle| is_free(rectangle, shown, taken, image))
+        let places = candidates([mark.x, mark.y], away, size, unit);
+        room.first_free(&places, &room.shown)
     };
     let beside = find(GAP);
     let rectangle = beside.or_else(|| find(FAR_GAP))?;
@@ -259,8 +279,8 @@ mod tests {
             kind: MarkKind::Identified,
             label: Some(StarLabel {
                 text: format!("05140095 {v_mag:.1}"),
-                v_mag,
                 has_name: false,
+                rank: v_mag,
             }),
         }
     }
@@ -279,7 +299,7 @@ mod tests {
             star.radius = random.random_range(4.0..13.0);
             let name = random.random_range(0..NAMES.len());
             star.label = star.label.map(|label| StarLabel {
-                text: format!("{} {:.1}", NAMES[name], label.v_mag),
+                text: format!("{} {:.1}", NAMES[name], label.rank),
                 has_name: name != 2,
                 ..label
             });
@@ -298,16 +318,13 @@ mod tests {
             let count = random.random_range(1..700);
             let marks = random_marks(&mut random, count, image);
             let rings = [Rings::Named, Rings::All, Rings::None][frame % 3];
-            let (mut labels, mut room) = place(&marks, rings, image, unit);
+            let mut room = Room::of(&marks, rings, image, unit);
+            let mut labels = room.place_names();
             assert!(rings != Rings::Named || labels.len() == room.marked().len());
             for i in 0..40 {
                 let at = image.map(|side| random.random_range(0.0..side));
                 let text = "M 42".to_owned();
-                let found = if i % 2 == 0 {
-                    room.beside(&text, at, 5.0, SIZE)
-                } else {
-                    room.around(&text, at, SIZE)
-                };
+                let found = room.beside(&text, at, 5.0 * (i % 2) as f32, SIZE);
                 labels.extend(found.map(|at| Label {
                     text,
                     at,
@@ -329,6 +346,32 @@ mod tests {
     }
 
     #[test]
+    fn a_name_near_a_point_stays_in_the_picture_and_off_named_stars() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let marks = random_marks(&mut random, 300, IMAGE);
+        let mut room = Room::of(&marks, Rings::All, IMAGE, 1.0);
+        let mut placed: Vec<Rectangle> = Vec::new();
+        for _ in 0..40 {
+            // Also beyond the border.
+            let middle = IMAGE.map(|side| random.random_range(-20.0..side + 20.0));
+            let Some([x, y]) = room.near("Cassiopeia", middle, 14.0) else {
+                continue;
+            };
+            let own = [
+                x,
+                y - CAPITALS * 14.0,
+                x + text_width("Cassiopeia", 14.0),
+                y,
+            ];
+            assert!(lies_within(&own, IMAGE));
+            assert!(placed.iter().all(|other| !overlap(other, &own)));
+            assert!(room.named.iter().all(|named| !named.is_covered_by(&own)));
+            placed.push(own);
+        }
+        assert!(placed.len() > 10, "{}", placed.len());
+    }
+
+    #[test]
     fn a_name_at_the_border_turns_inward() {
         for (x, y) in [
             (2.0, 2.0),
@@ -337,7 +380,8 @@ mod tests {
             (798.0, 598.0),
             (400.0, 598.0),
         ] {
-            let (labels, _) = place(&[mark(x, y, 1.0)], Rings::All, IMAGE, 1.0);
+            let alone = [mark(x, y, 1.0)];
+            let labels = Room::of(&alone, Rings::All, IMAGE, 1.0).place_names();
             assert_eq!(labels.len(), 1, "({x}, {y})");
             assert!(lies_within(&rectangle(&labels[0], 1.0), IMAGE));
         }
@@ -350,12 +394,14 @@ mod tests {
             mark(101.0, 100.0, 1.0),
             mark(102.0, 100.0, 3.0),
         ];
-        let (labels, _) = place(&crowded, Rings::All, IMAGE, 1.0);
+        let labels = Room::of(&crowded, Rings::All, IMAGE, 1.0).place_names();
         assert_eq!(labels[0].text, "05140095 1.0");
         let alone = [mark(5.0, 5.0, 1.0)];
-        let (labels, room) = place(&alone, Rings::Named, [20.0, 20.0], 1.0);
+        let mut room = Room::of(&alone, Rings::Named, [20.0, 20.0], 1.0);
+        let labels = room.place_names();
         assert!(room.marked().is_empty() && labels.is_empty());
-        let (labels, room) = place(&crowded, Rings::None, IMAGE, 1.0);
+        let mut room = Room::of(&crowded, Rings::None, IMAGE, 1.0);
+        let labels = room.place_names();
         assert!(room.marked().is_empty() && !labels.is_empty());
     }
 }

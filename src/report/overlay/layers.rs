@@ -4,10 +4,12 @@ use super::canvas::Canvas;
 use super::labels::Room;
 use super::picture::Picture;
 use super::sky::OverlayLayer;
+use crate::annotate::Scene;
 use crate::base::format::to_decimals;
 use crate::base::size::Size;
-use crate::identify::Identification;
+use crate::catalog::Catalog;
 use crate::report::figure::{DrawnShape, Letters};
+use crate::solve::Solution;
 use serde::Serialize;
 
 /// A layer, in pixels of the frame.
@@ -25,15 +27,28 @@ pub(in crate::report) struct SkyLayer {
     texts: Vec<(String, [f64; 2])>,
 }
 
-/// The layers of an identified frame that have something within it. A name stands where there is room
+/// The layers of a frame that have something within it; none where it is not identified. A name stands where there is room
 /// among the names of its layer.
-pub(in crate::report) fn sky_layers(size: Size, found: &Identification) -> Vec<SkyLayer> {
+pub(in crate::report) fn sky_layers(solution: &Solution, catalog: &Catalog) -> Vec<SkyLayer> {
+    let known = solution
+        .outcome
+        .identification()
+        .zip(Scene::of(solution, catalog));
+    let Some((found, scene)) = known else {
+        return Vec::new();
+    };
+    let size = Size::new(solution.width, solution.height);
     let picture = Picture::empty(size);
     let unit = picture.stroke_unit();
     let image = [size.width as f32, size.height as f32];
     let drawn = |layer: OverlayLayer| {
         let mut canvas = Canvas::new(size, unit);
-        layer.draw(&mut canvas, &picture, found, &mut Room::all(image, unit));
+        layer.draw(
+            &mut canvas,
+            (&picture, found),
+            &scene,
+            &mut Room::all(image, unit),
+        );
         SkyLayer::from_canvas(layer, canvas)
     };
     let layers = OverlayLayer::ALL.into_iter().map(drawn);

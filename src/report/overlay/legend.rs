@@ -1,6 +1,6 @@
-//! The strip below the frame: name, field, counts, scale bar and compass.
+//! The strip below the frame: what it shows, name, field, counts, scale bar and compass.
 
-use super::canvas::Canvas;
+use super::canvas::{Canvas, STRIP_HEIGHT as HEIGHT};
 use super::mark::{Mark, MarkKind};
 use super::picture::Picture;
 use crate::base::format::{counted, degrees, hours};
@@ -14,8 +14,6 @@ use crate::solve::Solution;
 
 // Lengths are in units of strokes.
 
-/// Height of the strip.
-const HEIGHT: f32 = 76.0;
 /// Smallest width of the strip, also below a narrow frame.
 const MIN_WIDTH: f32 = 460.0;
 /// Size of letters.
@@ -63,7 +61,7 @@ pub(super) fn size(picture: &Picture, unit: f32) -> Size {
 pub(super) fn draw(
     canvas: &mut Canvas,
     picture: &Picture,
-    title: &str,
+    (title, sentence): (&str, Option<&str>),
     solution: &Solution,
     marks: &[Mark],
 ) {
@@ -71,6 +69,9 @@ pub(super) fn draw(
     const GAP: f32 = 24.0;
     let top = picture.height as f32;
     let mut right = canvas.width() - PADDING * canvas.unit;
+    if picture.is_cut() {
+        return draw_caption(canvas, [top, right], sentence.unwrap_or(title));
+    }
     if let Some(found) = solution.outcome.identification() {
         right -= COMPASS * canvas.unit;
         let centre = [
@@ -81,13 +82,41 @@ pub(super) fn draw(
         right = draw_scale(canvas, picture, [right, top], found) - GAP * canvas.unit;
     }
     let left = PADDING * canvas.unit;
-    let lines = [title.to_owned(), field_line(solution)];
+    let lines = match sentence {
+        Some(sentence) => [
+            sentence.to_owned(),
+            format!("{title} · {}", field_line(solution)),
+        ],
+        None => [title.to_owned(), field_line(solution)],
+    };
     for (number, (line, color)) in lines.iter().zip([Rgb::WHITE, Rgb::DIM]).enumerate() {
         let at = [left, baseline(canvas, top, number)];
         let text = shortened(line, (right - left) / canvas.unit);
         canvas.text(&text, at, LETTERS, color);
     }
     draw_counts(canvas, [left, baseline(canvas, top, 2)], right, marks);
+}
+
+/// Draws the caption of a cut: what it shows, in up to three lines.
+fn draw_caption(canvas: &mut Canvas, [top, right]: [f32; 2], text: &str) {
+    const LINES: usize = 3;
+    let left = PADDING * canvas.unit;
+    let width = (right - left) / canvas.unit;
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let line = lines.last().map_or("", String::as_str);
+        let longer = format!("{line} {word}");
+        if text_width(&longer, LETTERS) <= width || lines.len() == LINES {
+            lines.pop();
+            lines.push(longer.trim_start().to_owned());
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    for (number, line) in lines.iter().enumerate() {
+        let at = [left, baseline(canvas, top, number)];
+        canvas.text(&shortened(line, width), at, LETTERS, Rgb::WHITE);
+    }
 }
 
 fn baseline(canvas: &Canvas, top: f32, line: usize) -> f32 {
@@ -124,6 +153,7 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
     let count = |kind: MarkKind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
         (MarkKind::Identified, "identified"),
+        (MarkKind::Placed, "at their place, not measured"),
         (MarkKind::Body, "of the solar system"),
         (MarkKind::Unidentified, "not identified"),
         (MarkKind::NotAStar, "not a star"),

@@ -4,8 +4,11 @@ use super::canvas::Canvas;
 use super::names::StarLabel;
 use super::options::LabelKind;
 use super::picture::Picture;
-use crate::catalog::Catalog;
+use crate::annotate::{AnnotationKind, Scene};
+use crate::base::coords::PixelPoint;
+use crate::catalog::{Catalog, StarIndex};
 use crate::ephemeris::solar_system::BodyKind;
+use crate::identify::SourceIndex;
 use crate::report::figure::Rgb;
 use crate::solve::{BodyInFrame, Solution, Source};
 
@@ -16,6 +19,8 @@ const RADIUS: (f32, f32) = (5.0, 15.0);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MarkKind {
     Identified,
+    /// A star at the place that the pose gives it: its light was not measured.
+    Placed,
     /// The Moon or a planet.
     Body,
     Unidentified,
@@ -27,17 +32,19 @@ impl MarkKind {
     pub(super) fn color(self) -> Rgb {
         match self {
             Self::Identified => Rgb([110, 205, 255]),
+            Self::Placed => Rgb([150, 225, 205]),
             Self::Body => Rgb([255, 225, 90]),
             Self::Unidentified => Rgb([255, 170, 60]),
             Self::NotAStar => Rgb([200, 120, 190]),
         }
     }
 
-    /// Draws the form of this kind: a circle, a rhombus, a square or a cross.
+    /// Draws the form of this kind: a circle, a dashed circle, a rhombus, a square or a cross.
     pub(super) fn draw(self, canvas: &mut Canvas, at: [f32; 2], radius: f32) {
         let [x, y] = at;
         match self {
             Self::Identified => canvas.ring(at, radius, 1.3, self.color()),
+            Self::Placed => canvas.dashed_ring(at, radius, 1.3, self.color()),
             Self::Body => {
                 let side = 1.25 * radius;
                 let corners = [[x - side, y], [x, y - side], [x + side, y], [x, y + side]];
@@ -80,25 +87,32 @@ impl Mark {
     }
 }
 
-/// The marks of the Moon and the planets, and of all detections, brightest first.
+/// The marks of the Moon and the planets, of stars that are not measured, and of all detections, brightest
+/// first.
 pub(super) fn marks(
     solution: &Solution,
+    scene: Option<&Scene>,
     catalog: &Catalog,
     picture: &Picture,
     label: LabelKind,
 ) -> Vec<Mark> {
     let rings = RingRadii::of(&solution.sources, picture);
-    let is_body = |index: usize| {
-        let mut bodies = solution.bodies.iter().filter_map(|body| body.source);
-        bodies.any(|source| source.get() == index)
-    };
     let matches = solution.matches_by_source();
-    let sources = solution.sources.iter().zip(matches).enumerate();
+    let placed: Vec<PlacedStar> = scene.map_or(Vec::new(), PlacedStar::all);
+    // Light without a name of its own that has another mark.
+    let is_marked = |index: usize| {
+        let bodies = solution.bodies.iter().filter_map(|body| body.source);
+        let of_placed = placed.iter().filter_map(|star| star.source);
+        bodies.chain(of_placed).any(|source| source.get() == index)
+    };
+    let sources = solution.sources.iter().zip(&matches).enumerate();
     let stars = sources
-        .filter(|(index, _)| !is_body(*index))
+        .filter(|(index, (_, named))| named.is_some() || !is_marked(*index))
         .map(|(_, (source, star_match))| {
             let [x, y] = picture.position_of(&source.position);
-            let label = star_match.map(|found| StarLabel::of_star(catalog, found.star, label));
+            let label = star_match
+                .as_ref()
+                .map(|found| StarLabel::of_star(catalog, found.star, label));
             Mark {
                 x,
                 y,
@@ -107,7 +121,53 @@ pub(super) fn marks(
                 label,
             }
         });
-    bodies(solution, picture).chain(stars).collect()
+    let of_placed = placed.iter().map(|star| {
+        let [x, y] = picture.position_of(&star.position);
+        let source = star
+            .source
+            .and_then(|index| solution.sources.get(index.get()));
+        Mark {
+            x,
+            y,
+            radius: source.map_or(rings.smallest, |source| rings.radius(source)),
+            kind: MarkKind::Placed,
+            label: Some(StarLabel::of_star(catalog, star.star, label)),
+        }
+    });
+    bodies(solution, picture)
+        .chain(of_placed)
+        .chain(stars)
+        .filter(|mark| picture.shows([mark.x, mark.y]))
+        .collect()
+}
+
+/// A star at the place that the pose gives it.
+struct PlacedStar {
+    star: StarIndex,
+    position: PixelPoint,
+    /// The detection of its light.
+    source: Option<SourceIndex>,
+}
+
+impl PlacedStar {
+    fn all(scene: &Scene) -> Vec<Self> {
+        let placed = scene
+            .annotations
+            .iter()
+            .filter_map(|shown| match shown.kind {
+                AnnotationKind::Star {
+                    star,
+                    source,
+                    unmeasured: Some(_),
+                } => Some(Self {
+                    star,
+                    position: shown.position,
+                    source,
+                }),
+                _ => None,
+            });
+        placed.collect()
+    }
 }
 
 /// The marks of the planets that are seen, and of the Moon, which may be too bright to be a detection.

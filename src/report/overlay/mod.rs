@@ -35,12 +35,14 @@ mod trails;
 
 pub use svg::is_overlay as is_svg;
 
+use crate::annotate::Scene;
 use crate::catalog::Catalog;
 #[cfg(feature = "page")]
 use crate::frame::Frame;
 use crate::solve::{Background, Solution};
 use canvas::Canvas;
 use image::RgbImage;
+use labels::Room;
 use mark::MarkKind;
 use picture::Picture;
 use std::io;
@@ -49,7 +51,9 @@ use std::io;
 pub(super) use encode::jpeg;
 #[cfg(feature = "page")]
 pub(super) use layers::{SkyLayer, sky_layers};
-pub use options::{LabelKind, OverlayFormat, OverlayOptions, Rings, SkyLayers, Stretch};
+pub use options::{
+    LabelKind, OverlayFormat, OverlayOptions, PictureCut, Rings, SkyLayers, Stretch,
+};
 pub use shown::Shown;
 
 /// Draws a frame with its detections, as a file of the kind that `options` say. It is marked as an overlay
@@ -90,14 +94,22 @@ fn drawing(
     options: &OverlayOptions,
 ) -> (Canvas, Picture) {
     let picture = Picture::draw(shown, solution.background.as_ref(), options);
-    let marks = mark::marks(solution, catalog, &picture, options.label);
+    let scene = Scene::of(solution, catalog);
+    let marks = mark::marks(solution, scene.as_ref(), catalog, &picture, options.label);
     let unit = picture.stroke_unit();
     let mut canvas = Canvas::new(legend::size(&picture, unit), unit);
     let image = [picture.width as f32, picture.height as f32];
-    let (labels, mut room) = labels::place(&marks, options.rings, image, unit);
-    if let Some(found) = solution.outcome.identification() {
-        sky::draw(&mut canvas, &picture, found, options.sky, &mut room);
+    let mut room = Room::of(&marks, options.rings, image, unit);
+    if let Some((found, scene)) = solution.outcome.identification().zip(scene.as_ref()) {
+        sky::draw(
+            &mut canvas,
+            (&picture, found),
+            scene,
+            options.sky,
+            &mut room,
+        );
     }
+    let labels = room.place_names();
     trails::draw(&mut canvas, &picture, solution);
     for mark in room.marked().iter().rev() {
         mark.draw(&mut canvas);
@@ -109,7 +121,14 @@ fn drawing(
         }
         canvas.text(&label.text, label.at, labels::SIZE, letters);
     }
-    legend::draw(&mut canvas, &picture, shown.title, solution, &marks);
+    let sentence = scene.map(|scene| scene.sentence);
+    legend::draw(
+        &mut canvas,
+        &picture,
+        (shown.title, sentence.as_deref()),
+        solution,
+        &marks,
+    );
     (canvas, picture)
 }
 

@@ -15,8 +15,30 @@ pub struct OverlayOptions {
     /// Width of the frame in the picture, in pixels; by default the frame's own or a whole fraction or
     /// multiple of it.
     pub width_px: Option<u32>,
+    /// The part of the frame that is shown, for sharing; by default all of it.
+    pub cut: Option<PictureCut>,
     /// The kind of file.
     pub format: OverlayFormat,
+}
+
+/// A picture for sharing: the middle of the frame in a usual size, with a caption.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PictureCut {
+    /// 1080 × 1080 pixels.
+    Square,
+    /// 1080 × 1350 pixels.
+    Story,
+}
+
+impl PictureCut {
+    /// Width and height, in pixels, with the caption.
+    pub const fn size_px(self) -> [u32; 2] {
+        match self {
+            Self::Square => [1080, 1080],
+            Self::Story => [1080, 1350],
+        }
+    }
 }
 
 impl OverlayOptions {
@@ -32,8 +54,11 @@ impl OverlayOptions {
 pub enum Stretch {
     /// In proportion, from the lowest level to the highest.
     None,
-    /// As a photograph: a dark sky is brightened to a fifth of white.
+    /// As its maker left it: a photograph of 8 bits as it is, linear data ([`Soft`](Self::Soft)) with a dark sky
+    /// brightened.
     #[default]
+    Auto,
+    /// As a photograph: a dark sky is brightened to a fifth of white.
     Soft,
     /// In grey and without its background, from just below the sky to the level of bright stars: faint stars show.
     Hard,
@@ -68,7 +93,7 @@ pub enum LabelKind {
 
 /// What of the sky is drawn beside its stars. The Moon and the planets, and where site and time are known
 /// the horizon, always are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SkyLayers {
     /// The figures and names of the constellations.
@@ -79,6 +104,27 @@ pub struct SkyLayers {
     pub equatorial_grid: bool,
     /// Azimuth and altitude, where site and time are known.
     pub horizontal_grid: bool,
+}
+
+impl SkyLayers {
+    /// None of them.
+    pub const NONE: Self = Self {
+        constellations: false,
+        deep_sky: false,
+        equatorial_grid: false,
+        horizontal_grid: false,
+    };
+}
+
+impl Default for SkyLayers {
+    /// Constellations and deep-sky objects, without grids.
+    fn default() -> Self {
+        Self {
+            constellations: true,
+            deep_sky: true,
+            ..Self::NONE
+        }
+    }
 }
 
 /// The kind of file of an overlay.

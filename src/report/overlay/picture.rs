@@ -1,6 +1,7 @@
 //! The frame as a picture.
 
-use super::options::{OverlayOptions, Stretch};
+use super::canvas::STRIP_HEIGHT;
+use super::options::{OverlayOptions, PictureCut, Stretch};
 use super::shown::Shown;
 use crate::base::coords::PixelPoint;
 use crate::base::size::Size;
@@ -13,6 +14,9 @@ use image::imageops::{FilterType, resize};
 /// The levels, over white, to which a dark sky is brightened, and a bright one darkened.
 const SKY_LEVELS: [f32; 2] = [0.2, 0.35];
 
+/// Size of letters and strokes of cuts for sharing, which are looked at on phones.
+const CUT_UNIT: f32 = 1.6;
+
 /// The frame as a picture.
 pub(super) struct Picture {
     /// Columns of the picture.
@@ -23,6 +27,10 @@ pub(super) struct Picture {
     pub(super) pixels: Vec<[u8; 3]>,
     /// Pixels of the picture per pixel of the frame, along one axis.
     scale: f32,
+    /// What is cut off at the left and at the top, in pixels of the picture.
+    cut_off: [f32; 2],
+    /// Whether it is a cut for sharing.
+    is_cut: bool,
 }
 
 /// By which whole factors a frame is enlarged and reduced: the smallest that give a picture of suitable
@@ -55,13 +63,17 @@ impl Picture {
         background: Option<&Background>,
         options: &OverlayOptions,
     ) -> Self {
+        if let Some(cut) = options.cut {
+            return Self::draw_cut(shown, background, options, cut);
+        }
         let frame = shown.frame;
         let (enlarged, reduced) = factors(frame, options.width_px);
         let squares = Squares::new(frame, reduced);
         let Size { width, height } = squares.size;
         let small = match options.stretch {
             Stretch::None => photograph(&squares, shown.colors, None),
-            Stretch::Soft => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
+            Stretch::Auto if is_finished(frame) => as_it_is(&squares, shown.colors),
+            Stretch::Soft | Stretch::Auto => photograph(&squares, shown.colors, Some(SKY_LEVELS)),
             Stretch::Hard => {
                 // The mean of n² pixels has 1/n of the noise.
                 let noise = background.map_or(0.0, |sky| sky.noise_adu as f32) / reduced as f32;
@@ -78,10 +90,51 @@ impl Picture {
             height: height * enlarged,
             pixels,
             scale: enlarged as f32 / reduced as f32,
+            cut_off: [0.0; 2],
+            is_cut: false,
         };
         match options.width_px {
             Some(wanted) => picture.with_width(wanted.max(1)),
             None => picture,
+        }
+    }
+
+    /// The middle of `frame` in the size of a cut, without the height of its caption.
+    fn draw_cut(
+        shown: &Shown<'_>,
+        background: Option<&Background>,
+        options: &OverlayOptions,
+        cut: PictureCut,
+    ) -> Self {
+        let [width, height] = cut.size_px();
+        let height = height - (STRIP_HEIGHT * CUT_UNIT) as u32;
+        let frame = shown.frame;
+        let by_height = (u64::from(height) * frame.width as u64).div_ceil(frame.height as u64);
+        let whole_width = u32::try_from(by_height)
+            .unwrap_or(u32::MAX)
+            .clamp(width, 8 * width);
+        let options = OverlayOptions {
+            cut: None,
+            width_px: Some(whole_width),
+            ..*options
+        };
+        let whole = Self::draw(shown, background, &options);
+        let [width, height] = [
+            whole.width.min(width as usize),
+            whole.height.min(height as usize),
+        ];
+        let [left, top] = [(whole.width - width) / 2, (whole.height - height) / 2];
+        let rows = whole.pixels.chunks(whole.width).skip(top).take(height);
+        Self {
+            width,
+            height,
+            pixels: rows
+                .flat_map(|row| &row[left..left + width])
+                .copied()
+                .collect(),
+            scale: whole.scale,
+            cut_off: [left as f32, top as f32],
+            is_cut: true,
         }
     }
 
@@ -100,6 +153,8 @@ impl Picture {
             height: height as usize,
             pixels,
             scale,
+            cut_off: [0.0; 2],
+            is_cut: false,
         }
     }
 
@@ -111,6 +166,8 @@ impl Picture {
             height: size.height,
             pixels: Vec::new(),
             scale: 1.0,
+            cut_off: [0.0; 2],
+            is_cut: false,
         }
     }
 
@@ -123,7 +180,14 @@ impl Picture {
             height: squares.size.height,
             pixels: photograph(&squares, None, Some(SKY_LEVELS)),
             scale: 1.0 / side as f32,
+            cut_off: [0.0; 2],
+            is_cut: false,
         }
+    }
+
+    /// Whether it is a cut for sharing.
+    pub(super) fn is_cut(&self) -> bool {
+        self.is_cut
     }
 
     /// The picture without marks.
@@ -142,12 +206,21 @@ impl Picture {
     pub(super) fn stroke_unit(&self) -> f32 {
         /// Letters and strokes grow with pictures that have a longer side above this.
         const LARGE_PICTURE_PX: f32 = 1300.0;
+        if self.is_cut {
+            return CUT_UNIT;
+        }
         (self.width.max(self.height) as f32 / LARGE_PICTURE_PX).max(1.0)
+    }
+
+    /// Whether a position in the picture is within it.
+    pub(super) fn shows(&self, [x, y]: [f32; 2]) -> bool {
+        (0.0..self.width as f32).contains(&x) && (0.0..self.height as f32).contains(&y)
     }
 
     /// Position in the picture of a position in the frame; (0, 0) is the upper left corner.
     pub(super) fn position_of(&self, pixel: &PixelPoint) -> [f32; 2] {
-        [pixel.x, pixel.y].map(|along| (along as f32 + 0.5) * self.scale())
+        let whole = [pixel.x, pixel.y].map(|along| (along as f32 + 0.5) * self.scale());
+        [whole[0] - self.cut_off[0], whole[1] - self.cut_off[1]]
     }
 }
 
@@ -244,6 +317,30 @@ fn photograph(
     let curve = StretchCurve::of(&light, colors.step, sky_levels);
     let color = |pixel: &[f32; 3]| pixel.map(|level| curve.apply(level));
     pixels.iter().map(color).collect()
+}
+
+/// Whether a frame is a picture that was made to be looked at: its levels are those of a screen.
+fn is_finished(frame: &Frame<'_>) -> bool {
+    frame.saturation_adu == Some(255.0)
+}
+
+/// A picture of 8 bits with its own levels.
+fn as_it_is(squares: &Squares<'_>, colors: Option<&Colors>) -> Vec<[u8; 3]> {
+    /// Levels of colors per level of 8 bits.
+    const OF_COLORS: f32 = 257.0;
+    let level = |light: f32, unit: f32| (light / unit).round().clamp(0.0, 255.0) as u8;
+    let Some(colors) = colors else {
+        let levels: Vec<u8> = squares
+            .light()
+            .iter()
+            .map(|&light| level(light, 1.0))
+            .collect();
+        return grey(&levels);
+    };
+    let [red, green, blue] = squares.colors(colors);
+    let all = red.iter().zip(&green).zip(&blue);
+    all.map(|((r, g), b)| [*r, *g, *b].map(|light| level(light, OF_COLORS)))
+        .collect()
 }
 
 /// Grey levels as colors.

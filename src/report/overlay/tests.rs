@@ -10,7 +10,7 @@ use crate::ephemeris::places::StarPlaces;
 use crate::frame::Frame;
 use crate::identify::{Identification, SearchFailure, SourceIndex, StarMatch};
 use crate::report::figure::{DrawnShape, Rgb};
-use crate::report::sample;
+use crate::solve::sample;
 use crate::solve::{Background, Measured, Outcome, Reason, Source};
 use nalgebra::Matrix3;
 

@@ -1,7 +1,7 @@
 //! What the scripts of a page draw.
 
 use crate::base::format::to_decimals;
-use crate::base::size::Size;
+use crate::catalog::Catalog;
 use crate::identify::StarMatch;
 use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
@@ -70,15 +70,13 @@ impl<'a> StarColumns<'a> {
 
 impl<'a> PageData<'a> {
     /// The numbers of a frame.
-    pub(super) fn new(report: &'a FrameReport, solution: &Solution) -> Self {
+    pub(super) fn new(report: &'a FrameReport, solution: &Solution, catalog: &Catalog) -> Self {
         let offsets = offsets(solution);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));
         let unlike = |(_, star): &(usize, &StarReport)| !star.is_star_like();
         let numbered = report.stars.iter().enumerate();
         let unlike_stars = numbered.filter(unlike).map(|(number, _)| number).collect();
-        let size = Size::new(report.width, report.height);
-        let found = solution.outcome.identification();
         let mut stars = StarColumns::default();
         for (star, offset) in report.stars.iter().zip(offsets) {
             stars.add(star, offset);
@@ -93,7 +91,7 @@ impl<'a> PageData<'a> {
             zero_point_exposure_s: report.exposure_s.filter(|_| is_rate).unwrap_or(1.0),
             limit50_vmag: photometry.and_then(|photometry| photometry.limit50_vmag),
             predicted_vmag: report.prediction.as_ref().and_then(|p| p.limit50_vmag),
-            sky: found.map_or_else(Vec::new, |found| sky_layers(size, found)),
+            sky: sky_layers(solution, catalog),
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::data::PageData;
 use super::template::{PageKind, picture_address, render, render_view, shown_data};
+use crate::catalog::Catalog;
 use crate::frame::Frame;
 use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
 use crate::report::{FrameReport, TextOptions};
@@ -28,10 +29,11 @@ const FRAME: PageKind = PageKind {
 pub fn html(
     report: &FrameReport,
     solution: &Solution,
+    catalog: &Catalog,
     shown: Option<&Shown<'_>>,
     options: &OverlayOptions,
 ) -> io::Result<String> {
-    let data = PageData::new(report, solution);
+    let data = PageData::new(report, solution, catalog);
     let picture = shown.map(|shown| picture(shown, solution, options));
     let title = shown.map_or(report.frame.as_str(), |shown| shown.title);
     let values = values(report, title, picture.transpose()?, &data);
@@ -55,10 +57,11 @@ pub struct FrameView {
 pub fn view(
     report: &FrameReport,
     solution: &Solution,
+    catalog: &Catalog,
     shown: &Shown<'_>,
     options: &OverlayOptions,
 ) -> io::Result<FrameView> {
-    let data = PageData::new(report, solution);
+    let data = PageData::new(report, solution, catalog);
     let picture = picture(shown, solution, options)?;
     let values = values(report, shown.title, Some(picture), &data);
     Ok(FrameView {
@@ -103,11 +106,10 @@ fn values(
 mod tests {
     use super::*;
     use crate::base::format::is_deceptive;
-    use crate::catalog::Catalog;
     use crate::identify::SearchFailure;
+    use crate::report::frame_report::StarReport;
     use crate::report::page::is_page;
-    use crate::report::{frame_report::StarReport, sample};
-    use crate::solve::{Outcome, Reason};
+    use crate::solve::{Outcome, Reason, sample};
 
     /// A frame with one detection that is not identified.
     fn frame() -> (Solution, FrameReport) {
@@ -126,7 +128,14 @@ mod tests {
         let (solution, mut report) = frame();
         report.frame = "<script>alert(1)</script>.tif".to_owned();
         report.stars[0].name = Some("</script><b>".to_owned());
-        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        let page = html(
+            &report,
+            &solution,
+            Catalog::built_in(),
+            None,
+            &OverlayOptions::default(),
+        )
+        .unwrap();
         assert!(!page.contains("<script>alert") && !page.contains("</script><b>"));
         assert!(page.contains("&lt;script&gt;alert(1)&lt;&#x2f;script&gt;.tif"));
         assert_eq!(page.matches("</script>").count(), 2);
@@ -138,7 +147,14 @@ mod tests {
         let (solution, mut report) = frame();
         let name = "a\n\t\u{1b}[31m\u{202e}\u{85}\u{2066}\"'.tif";
         report.frame = name.to_owned();
-        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        let page = html(
+            &report,
+            &solution,
+            Catalog::built_in(),
+            None,
+            &OverlayOptions::default(),
+        )
+        .unwrap();
         let is_raw = |c: char| c != '\n' && (c.is_control() || is_deceptive(c));
         assert!(!page.contains(is_raw) && !page.contains("<title>a\n"));
         assert!(
@@ -153,7 +169,14 @@ mod tests {
         let (solution, report) = frame();
         let pixels = Frame::new(400, 300, vec![0.5; 400 * 300]).unwrap();
         let shown = Shown::new("a <b>.tif", &pixels);
-        let view = view(&report, &solution, &shown, &OverlayOptions::default()).unwrap();
+        let view = view(
+            &report,
+            &solution,
+            Catalog::built_in(),
+            &shown,
+            &OverlayOptions::default(),
+        )
+        .unwrap();
         assert!(view.html.contains("Not identified") && view.html.contains("id=\"view\""));
         assert!(view.html.contains("a &lt;b&gt;.tif"));
         for mark in ["<script", "<style", "<html", "style=\""] {
@@ -166,7 +189,14 @@ mod tests {
     #[test]
     fn a_page_needs_no_other_file() {
         let (solution, report) = frame();
-        let page = html(&report, &solution, None, &OverlayOptions::default()).unwrap();
+        let page = html(
+            &report,
+            &solution,
+            Catalog::built_in(),
+            None,
+            &OverlayOptions::default(),
+        )
+        .unwrap();
         for reference in ["src=\"", "http:", "https:", "url(", "@import"] {
             let found = page
                 .replace("http://www.w3.org/2000/svg", "")

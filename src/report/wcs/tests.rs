@@ -6,7 +6,7 @@ use crate::base::coords::{Camera, Icrs, PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{Distortion, DistortionModel};
 use crate::ephemeris::places::StarPlaces;
-use crate::report::sample;
+use crate::solve::sample;
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use std::collections::HashMap;

@@ -95,9 +95,14 @@ const ROOMS: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "annotate",
+        &["base", "catalog", "ephemeris", "identify", "solve"],
+    ),
+    (
         "report",
         &[
             "base",
+            "annotate",
             "catalog",
             "ephemeris",
             "frame",

@@ -10,6 +10,7 @@ use super::canvas::Canvas;
 use super::labels::Room;
 use super::options::SkyLayers;
 use super::picture::Picture;
+use crate::annotate::Scene;
 use crate::identify::Identification;
 use view::PictureView;
 
@@ -27,10 +28,10 @@ impl OverlayLayer {
     /// All layers, in the order in which they are drawn.
     pub(super) const ALL: [Self; 5] = [
         Self::Horizon,
+        Self::Constellations,
+        Self::DeepSky,
         Self::EquatorialGrid,
         Self::HorizontalGrid,
-        Self::DeepSky,
-        Self::Constellations,
     ];
 
     /// Whether it is wanted; the horizon always is.
@@ -48,33 +49,35 @@ impl OverlayLayer {
     pub(super) fn draw(
         self,
         canvas: &mut Canvas,
-        picture: &Picture,
-        found: &Identification,
+        drawn: (&Picture, &Identification),
+        scene: &Scene,
         room: &mut Room<'_>,
     ) {
+        let (picture, found) = drawn;
         let view = PictureView { picture, found };
         match self {
             Self::Horizon => horizon::draw(canvas, &view),
             Self::EquatorialGrid => grid::equatorial(canvas, &view, room),
             Self::HorizontalGrid => grid::horizontal(canvas, &view, room),
-            Self::DeepSky => deep_sky::draw(canvas, &view, room),
-            Self::Constellations => figures::draw(canvas, &view, room),
+            Self::DeepSky => deep_sky::draw(canvas, &view, scene, room),
+            Self::Constellations => figures::draw(canvas, &view, scene, room),
         }
     }
 }
 
-/// Draws the layers that are wanted. Marks and names of stars are to be drawn over them.
+/// Draws the layers that are wanted. Names of stars are placed, and drawn, after those of constellations and
+/// deep-sky objects; grids get what room is left.
 pub(super) fn draw(
     canvas: &mut Canvas,
-    picture: &Picture,
-    found: &Identification,
+    drawn: (&Picture, &Identification),
+    scene: &Scene,
     layers: SkyLayers,
     room: &mut Room<'_>,
 ) {
-    for layer in OverlayLayer::ALL
+    let wanted = OverlayLayer::ALL
         .into_iter()
-        .filter(|layer| layer.is_in(layers))
-    {
-        layer.draw(canvas, picture, found, room);
+        .filter(|layer| layer.is_in(layers));
+    for layer in wanted {
+        layer.draw(canvas, drawn, scene, room);
     }
 }

@@ -16,8 +16,9 @@ impl PictureView<'_> {
     /// Where an apparent direction is, if it is within the frame.
     pub(super) fn apparent(&self, direction: &UnitVector<Icrs>) -> Option<[f32; 2]> {
         let pixel = self.found.pixel_of(direction)?;
-        let is_within = self.found.camera.contains(&pixel);
-        is_within.then(|| self.picture.position_of(&pixel))
+        let position = self.picture.position_of(&pixel);
+        let is_within = self.found.camera.contains(&pixel) && self.picture.shows(position);
+        is_within.then_some(position)
     }
 
     /// The same for a direction of the catalogue.

@@ -1,10 +1,12 @@
 //! A solution for tests.
 
+use super::outcome::Outcome;
+use super::solution::Solution;
+use super::stopwatch::Timing;
 use crate::ephemeris::places::AttitudeFrame;
-use crate::solve::{Outcome, Solution, Timing};
 
 /// A solution with this `outcome` and nothing else.
-pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
+pub(crate) fn solution(width: usize, height: usize, outcome: Outcome) -> Solution {
     Solution {
         width,
         height,
@@ -23,6 +25,7 @@ pub(super) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         spot_sigma_px: None,
         notes: Vec::new(),
         background: None,
+        sky_area: None,
         attitude_only: false,
         attitude_frame: AttitudeFrame::default(),
         outcome,
