@@ -77,6 +77,8 @@ NAMES = {
     "M 94": "Cat’s Eye Galaxy",
     "M 77": "Cetus A",
 }
+# Longer sides in arcminutes that the package has much too large, as SIMBAD has them.
+SIZES = {"NGC 1980": 14.0}
 # What the package lacks, as SIMBAD has it.
 OTHERS = [
     ["Mel 25", "Hyades", "open cluster", 0.5, 330.0, 66.75, 15.87],
@@ -142,7 +144,7 @@ def deep_sky(data):
     rows += others[: OBJECTS - len(rows)]
     rows.sort(key=lambda row: float(row[2]["mag"]))
     table = [
-        [name, NAMES.get(name, alternative), KINDS.get(about["type"], "stars"), round(float(about["mag"]), 1), size_arcmin(about["dim"]), *place(feature)]
+        [name, NAMES.get(name, alternative), KINDS.get(about["type"], "stars"), round(float(about["mag"]), 1), SIZES.get(name, size_arcmin(about["dim"])), *place(feature)]
         for name, alternative, about, feature in rows
     ]
     table = sorted(table + OTHERS, key=lambda row: row[3])

@@ -23,7 +23,7 @@ mod stars;
 
 use crate::base::coords::PixelPoint;
 use crate::base::units::DEG_PER_RAD;
-use crate::catalog::objects::deep_sky;
+use crate::catalog::objects::{DeepSkyObject, deep_sky};
 use crate::catalog::{Catalog, StarIndex};
 use crate::ephemeris::meteor_showers::active_radiants;
 use crate::ephemeris::solar_system::BodyKind;
@@ -190,11 +190,18 @@ impl<'a> View<'a> {
     fn deep_sky(&self) -> impl Iterator<Item = Annotation> + '_ {
         /// They are annotated to this much beyond the stars: they are looked for.
         const FAINTER_MAG: f64 = 2.0;
+        const NARROW_DEG: f64 = 5.0;
         let limit_mag = self.limit_mag(FAINTER_MAG);
         let bright = deep_sky()
             .iter()
             .take_while(move |object| object.v_mag < limit_mag);
-        bright.filter_map(|object| {
+        // Others are clutter in wide fields.
+        let is_known = |object: &&DeepSkyObject| {
+            !object.name.is_empty() || object.designation.starts_with("M ")
+        };
+        let is_narrow = self.field_deg < NARROW_DEG;
+        let known = bright.filter(move |object| is_narrow || is_known(object));
+        known.filter_map(|object| {
             let position = self
                 .found
                 .pixel_of(&self.found.places.apparent(&object.direction))?;

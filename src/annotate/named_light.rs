@@ -2,7 +2,9 @@
 
 use super::View;
 use crate::base::coords::PixelPoint;
+use crate::base::statistics::median_of;
 use crate::identify::SourceIndex;
+use crate::photometry::instrumental_mag;
 use crate::solve::Source;
 
 /// Why the light of a star in a frame is not its measurement.
@@ -47,44 +49,73 @@ impl Unmeasured {
     }
 }
 
-/// The detections without a name, brightest first, and those with one.
+/// The detections, and what each is known to be.
 pub(super) struct Lights<'a> {
     view: &'a View<'a>,
-    is_named: Vec<bool>,
+    /// V magnitude of the star or planet that a detection is.
+    named_v_mag: Vec<Option<f32>>,
+    /// V magnitude of a detection of flux 1.
+    zero_point_mag: Option<f64>,
 }
 
 impl<'a> Lights<'a> {
     pub fn new(view: &'a View<'a>) -> Self {
-        let mut is_named = vec![false; view.solution.sources.len()];
+        let sources = &view.solution.sources;
+        let mut named_v_mag = vec![None; sources.len()];
         for named in &view.found.matches {
-            is_named[named.source.get()] = true;
+            named_v_mag[named.source.get()] = Some(view.catalog.star(named.star).v_mag);
         }
-        for body in view.solution.bodies.iter().filter_map(|body| body.source) {
-            is_named[body.get()] = true;
+        let zero_points = sources
+            .iter()
+            .zip(&named_v_mag)
+            .filter_map(|(source, v_mag)| Some(f64::from((*v_mag)?) - mag_of(source)?));
+        let zero_point_mag = median_of(zero_points);
+        for seen in &view.solution.bodies {
+            if let Some(source) = seen.source {
+                named_v_mag[source.get()] = Some(seen.body.v_mag as f32);
+            }
         }
-        Self { view, is_named }
+        Self {
+            view,
+            named_v_mag,
+            zero_point_mag,
+        }
     }
 
-    /// The brightest light within `reach_px` of a place, and what it says of the star there. A named light is
-    /// that of another star.
-    pub fn at(&self, place: &PixelPoint, reach_px: f64) -> Option<(SourceIndex, Unmeasured)> {
-        let sources = self
-            .view
-            .solution
-            .sources
-            .iter()
-            .zip(&self.is_named)
-            .enumerate();
-        let mut near = sources.filter(|(_, (source, _))| {
+    /// The brightest light within `reach_px` of the place of a star of `v_mag`, and what it says of the star.
+    /// `None` where there is none that is bright enough, or where it is that of a brighter one, which outshines it.
+    pub fn at(
+        &self,
+        place: &PixelPoint,
+        reach_px: f64,
+        v_mag: f32,
+    ) -> Option<(SourceIndex, Unmeasured)> {
+        let sources = &self.view.solution.sources;
+        let index = sources.iter().position(|source| {
             let (dx, dy) = (source.position.x - place.x, source.position.y - place.y);
             dx * dx + dy * dy < reach_px * reach_px
-        });
-        let (index, (source, is_named)) = near.next()?;
-        let why = if *is_named {
-            Unmeasured::Blended
-        } else {
-            Unmeasured::of(source)
+        })?;
+        let why = match self.named_v_mag[index] {
+            Some(other) if other <= v_mag => return None,
+            Some(_) => Unmeasured::Blended,
+            None => Unmeasured::of(&sources[index]),
         };
-        Some((SourceIndex::new(index), why))
+        let is_bright = self.is_bright_enough(&sources[index], v_mag, why);
+        is_bright.then_some((SourceIndex::new(index), why))
     }
+
+    /// Whether light may be that of a star; what was measured of a saturated or extended spot may be little.
+    fn is_bright_enough(&self, source: &Source, v_mag: f32, why: Unmeasured) -> bool {
+        /// Tone curves, clouds and the edge of a lens make stars fainter by up to this.
+        const FAINTER_MAG: f64 = 2.5;
+        let found = mag_of(source).zip(self.zero_point_mag);
+        let found = found.map(|(mag, zero_point_mag)| mag + zero_point_mag);
+        let is_partial = matches!(why, Unmeasured::Saturated | Unmeasured::Extended);
+        is_partial || found.is_none_or(|found| found < f64::from(v_mag) + FAINTER_MAG)
+    }
+}
+
+/// The instrumental magnitude of a detection.
+fn mag_of(source: &Source) -> Option<f64> {
+    source.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
 }

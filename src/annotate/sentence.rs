@@ -6,8 +6,15 @@ use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::ephemeris::solar_system::BodyKind;
 use nalgebra::Vector3;
 
-/// From this angle from the axis on a frame shows the whole sky.
-const WHOLE_SKY_DEG: f64 = 75.0;
+/// From these angles from the axis on a frame shows the whole sky, or most of it.
+const WHOLE_SKY_DEG: f64 = 78.0;
+const MOST_OF_SKY_DEG: f64 = 60.0;
+/// Planets that are fainter are not seen.
+const VISIBLE_MAG: f64 = 5.0;
+/// Deep-sky objects with a name that people know, beside those of Messier's list.
+const FAMOUS: [&str; 9] = [
+    "Mel 25", "LMC", "SMC", "NGC 104", "NGC 869", "NGC 3372", "NGC 4755", "NGC 5139", "NGC 7000",
+];
 /// The north pole of the Milky Way (Reid & Brunthaler 2004, ApJ 616, 872: J2000.0).
 const GALACTIC_POLE_DEG: [f64; 2] = [192.859_5, 27.128_2];
 
@@ -20,7 +27,7 @@ pub(super) fn of(
     let reach_deg = view.found.camera.radius_rad() * DEG_PER_RAD;
     let is_round =
         view.found.camera.fov_x_rad().is_none() || view.found.camera.fov_y_rad().is_none();
-    if is_round && reach_deg >= WHOLE_SKY_DEG {
+    if is_round && reach_deg >= MOST_OF_SKY_DEG {
         return whole_sky(view, constellations, annotations);
     }
     let mut text = shown_constellations(constellations);
@@ -62,15 +69,13 @@ fn companions(annotations: &[Annotation]) -> String {
     for shown in annotations {
         let spoken = article(&shown.name);
         match shown.kind {
-            AnnotationKind::Body { .. } => names.push(spoken),
+            AnnotationKind::Body { .. } if is_visible(shown) => names.push(spoken),
+            // The Double Cluster has two numbers.
             AnnotationKind::DeepSky {
                 designation: number,
-            } if number != shown.name => {
-                // The Double Cluster has two numbers.
-                if !names.contains(&spoken) {
-                    names.push(spoken);
-                    designation = number;
-                }
+            } if is_famous(number, &shown.name) && !names.contains(&spoken) => {
+                names.push(spoken);
+                designation = number;
             }
             AnnotationKind::Radiant => radiants.push(spoken),
             _ => {}
@@ -85,6 +90,14 @@ fn companions(annotations: &[Annotation]) -> String {
         }
         all => format!(", with {}", listed(all)),
     }
+}
+
+fn is_visible(body: &Annotation) -> bool {
+    body.v_mag.is_some_and(|v_mag| v_mag < VISIBLE_MAG)
+}
+
+fn is_famous(designation: &str, name: &str) -> bool {
+    FAMOUS.contains(&designation) || (designation.starts_with("M ") && designation != name)
 }
 
 /// A name as it is spoken of: `the Orion Nebula`, `the Moon`, but `Jupiter` and `Omega Centauri`.
@@ -190,14 +203,20 @@ fn whole_sky(
     let near = constellations
         .iter()
         .filter(|seen| distance(seen) < NEAR * radius_px);
-    let mut text = "The whole sky".to_owned();
+    let is_whole = view.found.camera.radius_rad() * DEG_PER_RAD >= WHOLE_SKY_DEG;
+    let mut text = if is_whole {
+        "The whole sky"
+    } else {
+        "Most of the sky"
+    }
+    .to_owned();
     if let Some(seen) = near.max_by(|a, b| a.light.total_cmp(&b.light)) {
         text += &format!(", {} near the middle", seen.name);
     }
     text += &milky_way(view);
     let bodies: Vec<&str> = annotations
         .iter()
-        .filter(|shown| matches!(shown.kind, AnnotationKind::Body { .. }))
+        .filter(|shown| matches!(shown.kind, AnnotationKind::Body { .. }) && is_visible(shown))
         .map(|shown| shown.name.as_str())
         .collect();
     let planets: Vec<String> = bodies
@@ -232,7 +251,7 @@ fn milky_way(view: &View<'_>) -> String {
             view.found.camera.contains(&place).then_some((point, place))
         })
         .collect();
-    let Some((from, to)) = farthest_apart(&seen) else {
+    let Some([from, to]) = farthest_apart(&seen) else {
         return String::new();
     };
     let names = match view.found.places.horizon() {
@@ -250,12 +269,10 @@ fn milky_way(view: &View<'_>) -> String {
 }
 
 /// The two that are farthest apart in the picture.
-fn farthest_apart<T>(seen: &[(T, PixelPoint)]) -> Option<(&(T, PixelPoint), &(T, PixelPoint))> {
-    let pairs = seen.iter().flat_map(|a| seen.iter().map(move |b| (a, b)));
-    pairs.max_by(|a, b| {
-        let apart = |pair: &(&(T, PixelPoint), &(T, PixelPoint))| pair.0.1.distance_to(&pair.1.1);
-        apart(a).total_cmp(&apart(b))
-    })
+fn farthest_apart<T>(seen: &[(T, PixelPoint)]) -> Option<[&(T, PixelPoint); 2]> {
+    let pairs = seen.iter().flat_map(|a| seen.iter().map(move |b| [a, b]));
+    let apart = |[a, b]: &[&(T, PixelPoint); 2]| a.1.distance_to(&b.1);
+    pairs.max_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
 /// The point of the compass of an azimuth.

@@ -60,7 +60,7 @@ fn annotation(
                 return None;
             }
             let uncertainty_px = view.places.at(&position);
-            let (source, why) = lights.at(&position, uncertainty_px)?;
+            let (source, why) = lights.at(&position, uncertainty_px, known.v_mag)?;
             let is_hidden = why != Unmeasured::Saturated && !view.shows(&position);
             if is_hidden || view.places.is_large(uncertainty_px) {
                 return None;

@@ -73,7 +73,7 @@ fn days_after((month, number): (i8, i8), day: Date) -> Option<i32> {
     let peaks = years
         .into_iter()
         .filter_map(|year| Date::new(year, month, number).ok());
-    let days = peaks.filter_map(|peak| Some((day - peak).get_days()));
+    let days = peaks.map(|peak| (day - peak).get_days());
     days.min_by_key(|days| days.abs())
 }
 

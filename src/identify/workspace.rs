@@ -13,6 +13,7 @@ use crate::identify::fit::{NamingStart, Refined, Start};
 use crate::identify::hypothesis::Problem;
 use crate::identify::identification::{Identification, MIN_STARS, SearchFailure, StarMatch};
 use crate::identify::index::IndexedCatalog;
+use crate::identify::naming::Posed;
 use crate::identify::pairing::Pair;
 use crate::identify::priors::Priors;
 use crate::identify::search::{
@@ -496,7 +497,15 @@ impl<'w> PointedField<'w, '_> {
         let start = search.with_more_stars(&found);
         let named = with_names(problem, &mut search, &start, most_chance);
         let (refined, log10) = named.ok_or(failure)?;
-        let pairs = &search.refiner().pairs;
+        let pairs = &mut search.refiner().pairs;
+        let posed = Posed::new(
+            problem,
+            refined.hypothesis(),
+            refined.excess_sigma_px,
+            pairs,
+        );
+        pairs.extend(posed.pairs(most_chance));
+        pairs.sort_unstable_by_key(|pair| pair.observed);
         Ok(answered(answer, &refined, log10, problem.field, pairs))
     }
 

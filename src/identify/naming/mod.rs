@@ -26,6 +26,7 @@
 mod blends;
 mod candidate;
 mod completeness;
+mod conspicuous;
 mod likelihood;
 mod odds;
 mod packed;
@@ -33,6 +34,7 @@ mod unrelated;
 
 pub use blends::Blends;
 pub use candidate::NameCandidate;
+pub use conspicuous::Posed;
 pub use likelihood::position_density;
 
 use crate::identify::field::{ObservedStar, Photometry, StarField};

@@ -22,6 +22,11 @@ const LETTERS: f32 = 13.0;
 const PADDING: f32 = 10.0;
 /// Distance of the lines of text.
 const LINE: f32 = 20.0;
+/// Largest length of the scale bar, and as a share of the picture's width.
+const BAR: f32 = 150.0;
+const BAR_FRACTION: f32 = 0.3;
+/// Between the text and the scale bar.
+const GAP: f32 = 24.0;
 /// Side of the square with the arrows.
 const COMPASS: f32 = 72.0;
 
@@ -49,12 +54,40 @@ const LENGTHS: [(f64, &str); 20] = [
     (0.1, "0.1″"),
 ];
 
-/// Size of the whole picture, frame and strip.
-pub(super) fn size(picture: &Picture, unit: f32) -> Size {
-    Size::new(
-        picture.width.max((MIN_WIDTH * unit) as usize),
-        picture.height + (HEIGHT * unit) as usize,
-    )
+/// Size of the whole picture, frame and strip; the strip grows with a `sentence` that takes more than a line.
+pub(super) fn size(picture: &Picture, unit: f32, sentence: Option<&str>) -> Size {
+    let width = picture.width.max((MIN_WIDTH * unit) as usize);
+    let lines = match sentence {
+        Some(text) if !picture.is_cut() => wrapped(text, text_room(width as f32 / unit)).len(),
+        _ => 1,
+    };
+    let height = HEIGHT + LINE * (lines - 1) as f32;
+    Size::new(width, picture.height + (height * unit) as usize)
+}
+
+/// Width of the text in a strip of this width, beside scale and compass, in units.
+fn text_room(width: f32) -> f32 {
+    let scale = BAR.min(BAR_FRACTION * width);
+    width - 2.0 * PADDING - COMPASS - scale - GAP
+}
+
+/// `text` in lines of at most `width` units.
+fn wrapped(text: &str, width: f32) -> Vec<String> {
+    const MOST: usize = 3;
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let longer = match lines.last().map_or("", String::as_str) {
+            "" => word.to_owned(),
+            line => format!("{line} {word}"),
+        };
+        if text_width(&longer, LETTERS) <= width || lines.len() == MOST {
+            lines.pop();
+            lines.push(longer);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
 }
 
 /// Draws the strip.
@@ -65,13 +98,16 @@ pub(super) fn draw(
     solution: &Solution,
     marks: &[Mark],
 ) {
-    /// Between the text and the scale bar.
-    const GAP: f32 = 24.0;
     let top = picture.height as f32;
+    let left = PADDING * canvas.unit;
     let mut right = canvas.width() - PADDING * canvas.unit;
     if picture.is_cut() {
-        return draw_caption(canvas, [top, right], sentence.unwrap_or(title));
+        let room = (right - left) / canvas.unit;
+        let lines = wrapped(sentence.unwrap_or(title), room);
+        draw_lines(canvas, [left, top], room, &lines);
+        return;
     }
+    let room = text_room(canvas.width() / canvas.unit);
     if let Some(found) = solution.outcome.identification() {
         right -= COMPASS * canvas.unit;
         let centre = [
@@ -81,41 +117,27 @@ pub(super) fn draw(
         draw_compass(canvas, centre, found);
         right = draw_scale(canvas, picture, [right, top], found) - GAP * canvas.unit;
     }
-    let left = PADDING * canvas.unit;
+    let field = field_line(solution);
     let lines = match sentence {
-        Some(sentence) => [
-            sentence.to_owned(),
-            format!("{title} · {}", field_line(solution)),
-        ],
-        None => [title.to_owned(), field_line(solution)],
+        Some(sentence) => {
+            let mut lines = wrapped(sentence, room);
+            lines.push(format!("{title} · {field}"));
+            lines
+        }
+        None => vec![title.to_owned(), field],
     };
-    for (number, (line, color)) in lines.iter().zip([Rgb::WHITE, Rgb::DIM]).enumerate() {
-        let at = [left, baseline(canvas, top, number)];
-        let text = shortened(line, (right - left) / canvas.unit);
-        canvas.text(&text, at, LETTERS, color);
-    }
-    draw_counts(canvas, [left, baseline(canvas, top, 2)], right, marks);
+    draw_lines(canvas, [left, top], (right - left) / canvas.unit, &lines);
+    let below = [left, baseline(canvas, top, lines.len())];
+    draw_counts(canvas, below, right, marks);
 }
 
-/// Draws the caption of a cut: what it shows, in up to three lines.
-fn draw_caption(canvas: &mut Canvas, [top, right]: [f32; 2], text: &str) {
-    const LINES: usize = 3;
-    let left = PADDING * canvas.unit;
-    let width = (right - left) / canvas.unit;
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let line = lines.last().map_or("", String::as_str);
-        let longer = format!("{line} {word}");
-        if text_width(&longer, LETTERS) <= width || lines.len() == LINES {
-            lines.pop();
-            lines.push(longer.trim_start().to_owned());
-        } else {
-            lines.push(word.to_owned());
-        }
-    }
+/// Draws lines of text, the last of several dimmer.
+fn draw_lines(canvas: &mut Canvas, [left, top]: [f32; 2], room: f32, lines: &[String]) {
     for (number, line) in lines.iter().enumerate() {
+        let is_last = number > 0 && number + 1 == lines.len();
+        let color = if is_last { Rgb::DIM } else { Rgb::WHITE };
         let at = [left, baseline(canvas, top, number)];
-        canvas.text(&shortened(line, width), at, LETTERS, Rgb::WHITE);
+        canvas.text(&shortened(line, room), at, LETTERS, color);
     }
 }
 
@@ -182,9 +204,6 @@ fn draw_scale(
     [right, top]: [f32; 2],
     found: &Identification,
 ) -> f32 {
-    /// Largest length in units, and as a share of the picture's width.
-    const BAR: f32 = 150.0;
-    const BAR_FRACTION: f32 = 0.3;
     let most = (BAR * canvas.unit).min(BAR_FRACTION * canvas.width());
     let pixels = |arcsec: f64| {
         length_px(&found.camera, arcsec / 3600.0 * RAD_PER_DEG) as f32 * picture.scale()

@@ -97,7 +97,8 @@ fn drawing(
     let scene = Scene::of(solution, catalog);
     let marks = mark::marks(solution, scene.as_ref(), catalog, &picture, options.label);
     let unit = picture.stroke_unit();
-    let mut canvas = Canvas::new(legend::size(&picture, unit), unit);
+    let sentence = scene.as_ref().map(|scene| scene.sentence.as_str());
+    let mut canvas = Canvas::new(legend::size(&picture, unit, sentence), unit);
     let image = [picture.width as f32, picture.height as f32];
     let mut room = Room::of(&marks, options.rings, image, unit);
     if let Some((found, scene)) = solution.outcome.identification().zip(scene.as_ref()) {
@@ -121,11 +122,10 @@ fn drawing(
         }
         canvas.text(&label.text, label.at, labels::SIZE, letters);
     }
-    let sentence = scene.map(|scene| scene.sentence);
     legend::draw(
         &mut canvas,
         &picture,
-        (shown.title, sentence.as_deref()),
+        (shown.title, sentence),
         solution,
         &marks,
     );

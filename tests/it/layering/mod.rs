@@ -96,7 +96,14 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "annotate",
-        &["base", "catalog", "ephemeris", "identify", "solve"],
+        &[
+            "base",
+            "catalog",
+            "ephemeris",
+            "identify",
+            "photometry",
+            "solve",
+        ],
     ),
     (
         "report",
