@@ -1,4 +1,4 @@
-"""From a photograph of the night sky to the stars in it, and where the camera pointed.
+"""Identify the stars in photographs of the night sky, and measure where the camera pointed.
 
 >>> import starpipe as sp
 >>> pipeline = sp.Pipeline()

@@ -16,7 +16,7 @@ ARCSEC_PER_RAD = 180.0 * 3600.0 / np.pi
 
 
 class Attitude:
-    """The attitude of a camera in a frame; all of it is `None` where it is not known."""
+    """The attitude of a camera in a frame; its values are `None` if unknown."""
 
     @property
     def _attitude(self) -> dict[str, Any] | None:
@@ -39,7 +39,7 @@ class Attitude:
 
     @property
     def center(self) -> SkyCoord | None:
-        """Centre of the frame; of a lens that is no pinhole, where its axis points."""
+        """Direction of the frame's center; for lenses other than pinholes, of the lens's axis."""
         from astropy.coordinates import SkyCoord
 
         attitude = self._attitude

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Darks:
-    """What dark frames say of a detector.
+    """Properties of a detector, measured with dark frames.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ def darks(
 ) -> Darks:
     """Measure noise, pattern, dark current and hot pixels on frames taken without light.
 
-    Frames are read one after the other; none is kept.
+    Frames are read one after the other, and not kept in memory.
 
     Parameters
     ----------
@@ -80,9 +80,9 @@ def darks(
     exposure : Quantity or float, or a list of them, optional
         Exposure of all frames, or of each, in seconds; by default of the header.
     bits : int, optional
-        Bits of a grey level; by default of the file's format.
+        Bits of a gray level; by default of the file's format.
     gain : Quantity or float, optional
-        Electrons of a grey level.
+        Electrons of a gray level.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from ._images import Image, ImageLike
 
 
 class Flats:
-    """What flats say of a detector.
+    """Properties of a detector, measured with flats.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Flats:
     def master(self) -> NDArray[np.float32]:
         """Response of each pixel, with a mean of 1: a flat for `Pipeline.solve`.
 
-        NaN where it is not known.
+        NaN if unknown.
         """
         return self._flats.master().reshape(self._flats.shape)
 
@@ -60,8 +60,8 @@ def flats(
     dark : image, optional
         Frame taken without light, or the mean of many, see `Darks.masters`.
     camera : path or str, optional
-        A description of the camera (TOML), or the name of a preset: its level without light where
-        there is no dark, and its read noise.
+        A description of the camera (TOML), or the name of a preset: its bias if there is no dark,
+        and its read noise.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def flats(
     """
     if dark is None and camera is None:
         logging.getLogger("starpipe").warning(
-            "the level without light is assumed to be 0: give dark or camera"
+            "the dark level is assumed to be 0: give dark or camera"
         )
     frames = _starpipe.FlatFrames(None if dark is None else Image(dark, "dark").pixels, camera)
     for image in images:

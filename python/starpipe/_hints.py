@@ -111,7 +111,7 @@ def iso_date(date: Any) -> str | None:
 
 
 def site(location: Any) -> tuple[float, float, float]:
-    """Return latitude and longitude in degrees, and height in metres."""
+    """Return latitude and longitude in degrees, and height in meters."""
     if hasattr(location, "geodetic"):
         place = location.geodetic
         return float(place.lat.deg), float(place.lon.deg), float(place.height.to_value("m"))

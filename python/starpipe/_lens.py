@@ -13,7 +13,7 @@ from ._result import Result
 
 
 class LensCalibration:
-    """A lens that was measured in several frames.
+    """A lens measured in several frames.
 
     Attributes
     ----------
@@ -21,8 +21,8 @@ class LensCalibration:
         As the JSON of ``starpipe calibrate``: ``lens``, ``frames``, ``left_out``, ``rms_px``,
         ``held_out_rms_px``, ``drift``, ``mount``, ...
     toml : str
-        The lens as a description of a camera: ``Pipeline(camera=path)`` with a file of it holds the
-        lens.
+        The lens as a description of a camera: ``Pipeline(camera=path)`` with a file of it uses
+        the lens.
     """
 
     def __init__(self, report: dict[str, Any], toml: str) -> None:
@@ -45,7 +45,7 @@ class LensCalibration:
 def calibrate(results: Iterable[Result]) -> LensCalibration:
     """Measure the lens of a camera in frames that a pipeline has solved.
 
-    Frames that are not identified, or do not fit the others, are left out, see
+    Frames that are not identified, or do not fit the others, are not used, see
     ``LensCalibration.report["left_out"]``.
 
     Parameters

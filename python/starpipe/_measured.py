@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distortion:
-    """How a lens departs from its ideal.
+    """Distortion of a lens.
 
     Attributes
     ----------
@@ -36,18 +36,18 @@ class Distortion:
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How well the detections match the catalogue.
+    """How well the detections match the catalog.
 
     Attributes
     ----------
     detected, matched : int
         Detections, and those identified with a star.
     stars_expected : float or None
-        Catalogue stars that the camera should find in the field, where one is stated.
+        Expected number of catalog stars detected in the field, if a camera is given.
     rms_px, rms_arcsec : float
         Root mean square of the residuals, in pixels and in arcseconds.
     log10_false_alarm : float
-        log10 of the probability that chance gives as good a match.
+        log10 of the false-alarm probability.
     """
 
     detected: int
@@ -60,22 +60,22 @@ class Match:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """How faint a frame goes, in V magnitudes. What is not known is None.
+    """Limiting magnitude of a frame, in V. Unknown values are None.
 
     Attributes
     ----------
     limit50_vmag, limit50_sigma_mag : float or None
-        Magnitude at which half of the catalogue's stars are detected, and its standard error.
+        Magnitude at which half of the catalog's stars are detected, and its standard error.
     limit50_reason : str or None
-        Why it is not known.
+        Why it is unknown.
     faintest_vmag : float or None
         The faintest identified star.
     predicted_limit_vmag : float or None
-        Magnitude at which the stated camera should find half of the stars.
+        Predicted magnitude at which the camera detects half of the stars.
     limit_difference_mag, limit_difference_sigma_mag : float or None
         Detected minus predicted limit, and the standard error of the measurement.
     expected_faintest_vmag, expected_faintest_sigma_mag : float or None
-        The faintest star that the stated camera should find in this field, and its scatter.
+        Predicted faintest star detected by the camera in this field, and its scatter.
     """
 
     limit50_vmag: float | None

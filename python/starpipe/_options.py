@@ -1,4 +1,4 @@
-"""What is stated for frames: one set of options for all that solves them."""
+"""Options for solving frames."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class SolveOptions(TypedDict, total=False):
-    """What is stated for frames. All of it is optional.
+    """Options for solving frames. All of it is optional.
 
     Parameters
     ----------
@@ -41,30 +41,29 @@ class SolveOptions(TypedDict, total=False):
         Horizontal field of view (degrees), or the angle of a pixel (arcseconds, or arcseconds per
         pixel).
     scale_error : Quantity or float
-        How far `fov` or `pixel_scale` may be off, in percent; 10 by default.
+        Tolerance of `fov` or `pixel_scale`, in percent; 10 by default.
     near : SkyCoord or (ra, dec)
-        Where the centre of the frame lies, in degrees.
+        Approximate direction of the frame's center, in degrees.
     radius : Angle or float
-        How far from there it may lie, in degrees; 10 by default.
+        Maximum distance from there, in degrees; 10 by default.
     date : Time, datetime or str
         When the frame was taken, in UTC. By default of the header or the file's name.
     utc_offset : Quantity, float or "auto"
-        How many hours local times are ahead of UTC: those in names of files and in Exif, unless
-        they say.
-        "auto" finds it by the stars over `site`.
+        Offset of local time from UTC in hours, positive if ahead, for times in file names and
+        in Exif that state none. "auto" measures it with the stars and `site`.
     site : EarthLocation or (latitude, longitude[, height])
-        Where it was taken, in degrees and metres.
+        Where it was taken, in degrees and meters.
     air : (pressure, temperature)
         The air at the site, in hPa and °C, for refraction; by default of the standard atmosphere.
     velocity : CartesianRepresentation or (vx, vy, vz)
-        Velocity of a spacecraft relative to the Earth's centre in km/s, along the axes of ICRS.
+        Velocity of a spacecraft relative to the Earth's center in km/s, along the axes of ICRS.
     frame_of : {"icrs", "apparent"}
-        Which directions the attitude refers to: those of the catalogue, or those from which light
-        reaches the camera, with aberration and refraction.
+        Directions that the attitude refers to: those of the catalog, or the apparent ones, with
+        aberration and refraction.
     exposure : Quantity or float
         Exposure in seconds. By default of the header.
     zenith_distance : Angle or float
-        Zenith distance of the frame's centre in degrees, for the prediction of a camera.
+        Zenith distance of the frame's center in degrees, for the prediction of a camera.
     extinction : Quantity or float
         Extinction in magnitudes per airmass, for the same.
     sigma : float
@@ -72,24 +71,23 @@ class SolveOptions(TypedDict, total=False):
     false_alarms : float
         Accepted false detections in a million pixels of noise; 0.1 by default.
     max_stars : int
-        Measure the brightest stars alone.
+        Measure only this many of the brightest stars.
     centroid : {"gaussian-fit", "grey-weighted"}
         How to measure the position of a star: the first is the most accurate, and the default.
     name_odds : float
-        A star is named where the odds are at least this many to 1 that the name is right; 100 by
-        default.
+        Minimum odds, to 1, that the name of a star is right; 100 by default.
     effort : {"fast", "normal", "thorough"}
-        How much is tried where the brightest stars do not identify a frame at once.
+        Effort of the search if the brightest stars do not identify a frame.
     refine_lens : bool
-        Fit the lens to each frame, although the camera's description has one that was measured.
+        Fit the lens to each frame, even if the camera's description has a measured one.
     attitude_only : bool
-        Stop at the attitude: no star beyond the brightest is named.
+        Measure attitude and optics only, and name only the brightest stars.
     sky : bool
-        Measure the sky at each place: `Result.sky_map`.
+        Measure brightness, extinction and clouds in each part of the sky: `Result.sky_map`.
     trails : bool
-        Search satellites, aeroplanes and meteors: `Result.trails`.
+        Search for trails of satellites, aircraft and meteors: `Result.trails`.
     time_limit : Quantity or float
-        How long a frame may take, in seconds. By default as long as it needs.
+        Time limit for a frame, in seconds. No limit by default.
     """
 
     fov: Quantity | float | None
@@ -167,9 +165,9 @@ def solve_options(header: Any = None, **options: Any) -> dict[str, str]:
     known = {"date": header_date(header), "exposure": header_exposure(header)}
     known |= {name: value for name, value in options.items() if value is not None}
     if {"fov", "pixel_scale"} <= known.keys():
-        raise ValueError("fov and pixel_scale say the same: give one")
+        raise ValueError("fov and pixel_scale are alternatives: give one")
     if "air" in known and "site" not in known:
-        raise ValueError("air is that of a site: give the site, too")
+        raise ValueError("air needs a site: give the site, too")
     stated = {name: _text(name, value) for name, value in known.items() if value is not None}
     _starpipe.check_options(stated)
     return stated

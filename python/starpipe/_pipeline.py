@@ -26,26 +26,26 @@ if TYPE_CHECKING:
 class Pipeline:
     """Find and name the stars of frames, and determine where the camera pointed.
 
-    A pipeline may be used by several threads at once, and can be pickled. Its catalogue is read
-    once in a process.
+    A pipeline may be used by several threads at once, and can be pickled. Its catalog is read once
+    per process.
 
     Parameters
     ----------
     catalog : path, optional
-        A star catalogue in place of the built-in one: SKY2000, Tycho-2, a table, or a file written
+        A star catalog instead of the built-in one: SKY2000, Tycho-2, a table, or a file written
         by ``starpipe catalog import``.
     camera : path or str, optional
-        A description of the camera (TOML), or the name of a preset. It gives the scale where no
+        A description of the camera (TOML), or the name of a preset. It gives the scale if no
         argument does, and a predicted limiting magnitude.
     cache_dir : path, optional
-        Where the index of the catalogue is kept. The user's cache directory by default.
+        Directory for the index of the catalog. The user's cache directory by default.
 
     Raises
     ------
     OSError
         If a file cannot be read.
     ValueError
-        If there is no catalogue or no camera in it.
+        If there is no catalog or no camera in it.
     """
 
     def __init__(
@@ -84,19 +84,18 @@ class Pipeline:
         image : path, bytes, file, array, PIL image, HDU, HDUList, CCDData or NDData
             The frame. An array is (rows, columns), of real numbers, or (rows, columns, 3) of
             colors. Arrays of uint8, uint16 and float32 that are contiguous are not copied. Of an
-            HDUList that image is taken which is taken of its file. Mask and header of an object are
-            used.
+            HDUList the same image is used as of its file. Mask and header of an object are used.
         mask : array of bool, optional
-            True where a pixel is to be left out, in the order of the rows of `image`.
+            True where a pixel is to be ignored, in the order of the rows of `image`.
         name : path, optional
             Name of the frame, if it does not come as a path; a date in it is used.
         dark, flat : image, optional
-            What to subtract, and by what to divide. They apply to the picture as drawn where frame
-            and master are files, else row by row.
+            Master dark to subtract, and master flat to divide by. They apply to the picture as
+            displayed if frame and master are files, else row by row.
         threads : int
             Threads for this frame. More than 8 are started only where there are more processors.
         **options
-            What is stated of the frame, see `SolveOptions`.
+            Options, see `SolveOptions`.
 
         Returns
         -------
@@ -124,7 +123,7 @@ class Pipeline:
         return _in_time(solved, frame)
 
     def point(self, image: ImageLike, mask: ArrayLike | None = None, **known: Any) -> Result:
-        """Find out where the camera points, from the brightest stars, and no more.
+        """Measure only where the camera points, from the brightest stars.
 
         Several times faster than `solve`: the faint stars are neither measured nor named.
 
@@ -166,21 +165,21 @@ class Pipeline:
         Parameters
         ----------
         x, y : array
-            Positions in pixels: (0, 0) is the centre of the first pixel.
+            Positions in pixels: (0, 0) is the center of the first pixel.
         shape : (int, int), optional
             Rows and columns of the frame; those of the pipeline's camera by default. Without a
-            camera the frame is as large as the centroids reach, `notes` tell of it, and the
-            errors have that the frame's centre is not known.
+            camera the extent of the centroids is used; `notes` say so, and the errors include that
+            the frame's center is uncertain.
         flux, mag : array, optional
-            Brightness, linear or in magnitudes: one of them. Without it the positions are in order
-            of brightness.
+            Brightness, linear or in magnitudes: one of them. Without it the positions must be
+            sorted by brightness.
         error : array or float, optional
             Standard error on each axis, in pixels; 0.5 by default.
 
-            Positions with a number that is not finite, a flux or an error of 0 or below, and those
-            that coincide with a brighter one are left out; `notes` tell of them.
+            Positions are ignored if a number is not finite, if a flux or an error is 0 or below, or
+            if they coincide with a brighter one; `notes` report them.
         **options
-            What is stated of the frame, see `SolveOptions`; what is of pixels alone is not used.
+            Options, see `SolveOptions`; those for pixels are ignored.
 
         Returns
         -------
@@ -225,12 +224,12 @@ class Pipeline:
     ) -> Iterator[Result]:
         """Solve many frames on several threads; results come in the order of the images.
 
-        Images are taken as results are used: at most twice as many as threads are in work.
+        Images are read as results are used: at most twice as many as threads are in progress.
 
         Parameters
         ----------
         images : iterable
-            Images as `solve` takes them, best paths.
+            Images as `solve` takes them, preferably paths.
         threads : int
             Frames that are solved at once, each within the memory that a frame may take. More than
             8 are started only where there are more processors.

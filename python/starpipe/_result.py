@@ -30,13 +30,15 @@ if TYPE_CHECKING:
 
 
 class Result(Attitude):
-    """What was found in a frame. In a condition it is true where the stars are identified.
+    """What was found in a frame. As a condition it is true if the stars are identified.
 
     Pixels are those of the array, or of the array that ``astropy.io.fits.getdata`` reads from the
-    file: (0, 0) is the centre of the first pixel of its first row, x runs along a row, y counts
-    rows. Everything else agrees with that: `wcs`, `quaternion`, whether the frame is mirrored.
+    file: (0, 0) is the center of the first pixel of its first row, x runs along a row, y counts
+    rows. Everything else refers to the same pixels: `wcs`, `quaternion`, whether the frame is
+    mirrored.
 
-    What is not known is None: of a frame that is not identified, all that follows from its stars.
+    Unknown values are None; if the frame is not identified, this applies to everything measured
+    with its stars.
 
     Attributes
     ----------
@@ -147,7 +149,7 @@ class Result(Attitude):
             attitude, optics, match = report["attitude"], report["optics"], report["match"]
             rows += [
                 ("shows", str(self.sentence)),
-                ("centre", f"{attitude['ra_deg']:.5f}°, {attitude['dec_deg']:+.5f}°"),
+                ("center", f"{attitude['ra_deg']:.5f}°, {attitude['dec_deg']:+.5f}°"),
                 ("field", f"{optics['fov_x_deg']:.3f}° by {optics['fov_y_deg']:.3f}°"),
                 ("stars", f"{match['matched']} of {match['detected']} named"),
                 ("false alarm", f"10^{match['log10_false_alarm']:.0f}"),
@@ -231,7 +233,7 @@ class Result(Attitude):
 
     @property
     def notes(self) -> list[str]:
-        """What is odd about the frame."""
+        """Notes: problems of the header or the options, and unusual properties of the frame."""
         return [note["text"] for note in self._report["notes"]]
 
     @property
@@ -241,17 +243,17 @@ class Result(Attitude):
 
     @property
     def prediction(self) -> dict[str, Any] | None:
-        """What the camera should see, where one is stated."""
+        """Prediction for the camera, if one is given."""
         return self._report["prediction"]  # type: ignore[no-any-return]
 
     @property
     def sky_map(self) -> dict[str, Any] | None:
-        """The sky at each place, with ``sky=True``: the `sky` of the JSON, magnitudes in V."""
+        """Brightness, extinction and clouds, with ``sky=True``: `sky` of the JSON."""
         return self._report.get("sky")
 
     @property
     def trails(self) -> list[dict[str, Any]] | None:
-        """Satellites, aeroplanes and meteors, with ``trails=True``: the `trails` of the JSON."""
+        """Trails of satellites and the like, with ``trails=True``: `trails` of the JSON."""
         return self._report.get("trails")
 
     @property
@@ -273,7 +275,8 @@ class Result(Attitude):
     def fov(self) -> Quantity | None:
         """Field of view: horizontal and vertical, in degrees.
 
-        The angles between the middles of opposite borders; NaN where one does not see the sky.
+        The angles between the midpoints of opposite borders; NaN if one is outside the image
+        circle.
         """
         optics = self._report["optics"]
         if optics is None:
@@ -282,9 +285,9 @@ class Result(Attitude):
 
     @property
     def pixel_scale(self) -> Quantity | None:
-        """Angle of a pixel at the frame's centre, in arcseconds per pixel.
+        """Pixel scale at the frame's center, in arcseconds per pixel.
 
-        On the axis, for a lens that is no pinhole.
+        On the axis, for lenses other than pinholes.
         """
         optics = self._report["optics"]
         if optics is None:
@@ -293,7 +296,7 @@ class Result(Attitude):
 
     @property
     def distortion(self) -> Distortion | None:
-        """Distortion of the lens; None also where the stars show none."""
+        """Distortion of the lens; None also if it is not measurable."""
         optics = self._report["optics"]
         found = None if optics is None else optics["distortion"]
         if found is None:
@@ -303,7 +306,7 @@ class Result(Attitude):
 
     @property
     def match(self) -> Match | None:
-        """How well the detections match the catalogue."""
+        """How well the detections match the catalog."""
         found = self._report["match"]
         if found is None:
             return None
@@ -350,7 +353,7 @@ class Result(Attitude):
     def stars(self) -> QTable:
         """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`.
 
-        Cells have units. Where numbers are wanted, as in ``float(row["x"])``, use `plain_stars`.
+        Cells have units. If plain numbers are needed, as in ``float(row["x"])``, use `plain_stars`.
         """
         return self._star_table(plain=False)
 
@@ -403,14 +406,14 @@ class Result(Attitude):
         image : path, array or another image, optional
             The photograph, where the result has none: of a list of centroids, of an array that
             `Pipeline.solve_many` was given, or of an array and restored by pickle. Without it the
-            ground is dark.
+            background is dark.
         rings : {"named", "all", "none"}
             Which detections are marked: those that get their name, and all in a frame that is not
             identified; all; or none. A circle is identified, a square is not, a cross is not
             shaped like a star.
         names : int
             How many stars get their name: the brightest with a name, and then the brightest others
-            with their number in a catalogue.
+            with their number in a catalog.
 
         Returns
         -------
@@ -438,7 +441,7 @@ class Result(Attitude):
     def write_page(
         self, path: PathLike, *, image: ImageLike | None = None, overwrite: bool = False
     ) -> None:
-        """Write a page to look at in a browser, as ``starpipe process --html`` does.
+        """Write a page for a browser, as ``starpipe process --html`` does.
 
         One HTML file without references to others: the answer, the picture with its stars, figures
         and a table. Pixels are those of `stars`, and the first row is on top.

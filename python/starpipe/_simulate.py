@@ -63,12 +63,12 @@ class Simulation:
 
     @property
     def columns(self) -> _tables.Columns:
-        """What is on the frame, as arrays: stars, false stars, trails and cosmic rays."""
+        """True objects on the frame, as arrays: stars, false stars, trails and cosmic rays."""
         return _tables.columns(json.loads(self._truth or "[]"))
 
     @property
     def stars(self) -> QTable:
-        """What is on the frame as a ``QTable``; without astropy `columns`."""
+        """True objects on the frame as a ``QTable``; without astropy `columns`."""
         units = {"vmag": "mag", "bv_mag": "mag", "ra_deg": "deg", "dec_deg": "deg"}
         places = dict.fromkeys(("x", "y", "x_end", "y_end"), "pix")
         return _tables.table(self.columns, units | places | {"electrons": "electron"})
@@ -96,8 +96,8 @@ def simulate(
     camera : path or str
         A description of the camera (TOML), or the name of a preset.
     ra, dec, roll : Angle or float, optional
-        Centre of the frame and position angle of the image's up direction, in degrees. Without
-        them the pointing is drawn from all rotations.
+        Center of the frame and position angle of the image's up direction, in degrees. Without them
+        the pointing is random, uniform over all rotations.
     dark : bool
         Keep the shutter closed.
     flat : float, optional
@@ -110,7 +110,7 @@ def simulate(
     exposure : Quantity or float, optional
         Exposure in seconds.
     catalog : path, optional
-        Stars in place of the built-in ones.
+        Stars instead of the built-in ones.
     **parameters
         Other numbers of camera, conditions and scene, by the names of the program's options, as
         ``read_noise_e`` or ``satellite_trails``.

@@ -34,7 +34,7 @@ def limit(
     exposure : Quantity or float, optional
         Exposure in seconds.
     reading : {'paper', 'physical'}, optional
-        The equations: those of the paper, or the same with corrected physics.
+        The equations of the paper, or the same with physical errors corrected.
     **parameters
         Other numbers of camera and conditions, by the names of the program's options, as
         ``aperture_mm`` or ``sky_mag_arcsec2``.
@@ -95,8 +95,7 @@ def validate(
 ) -> Validation:
     """Simulate frames at random attitudes, solve them, and compare them with the truth.
 
-    All rows are kept in memory; ``starpipe validate`` writes them to files, and goes on where it
-    was interrupted.
+    All rows are kept in memory; ``starpipe validate`` writes them to files, and continues interrupted runs.
 
     Parameters
     ----------
@@ -145,7 +144,7 @@ def robustness(
     count, seed, threads : int
         Trials of each row, seed of the random numbers, and threads.
     stars : float
-        Mean number of catalogue stars on a frame.
+        Mean number of catalog stars on a frame.
     centroid_error, mag_error : float
         Standard deviations, in pixels and magnitudes.
     missing, false : float
@@ -196,7 +195,7 @@ def defocus(
     exposure: Quantity | float | None = None,
     **parameters: float,
 ) -> dict[str, Any]:
-    """Measure the error of centroids over the radius of the spot, and the radius to set.
+    """Measure the centroid error as a function of the spot radius, and the best radius.
 
     Parameters
     ----------
@@ -207,7 +206,7 @@ def defocus(
     required_error : float or list
         Errors in pixels: the radii that meet them are reported.
     darks : Darks, optional
-        Frames whose noise is taken.
+        Dark frames from which the noise is taken.
     count, seed, threads : int
         Stars at each point, seed of the random numbers, and threads.
     exposure, **parameters
@@ -219,7 +218,7 @@ def defocus(
         As the JSON of ``starpipe defocus``.
     """
     if camera is None and (exposure is not None or parameters or np.size(vmag)):
-        raise ValueError("vmag, exposure and other numbers are of a camera: give one")
+        raise ValueError("vmag, exposure and other numbers need a camera: give one")
     report = _starpipe.defocus(
         None if camera is None else stated(camera, exposure, None, parameters),
         None if darks is None else darks._darks,

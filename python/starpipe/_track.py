@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Track(Attitude):
-    """What tracking says of a frame. In a condition it is true where the attitude is known.
+    """Result of tracking for a frame. As a condition it is true if the attitude is known.
 
     Pixels are as in `Result`.
     """
@@ -72,7 +72,7 @@ class Track(Attitude):
     def rate(self) -> Quantity | None:
         """Angular rate of the camera about its x, y and z axes, in degrees per second.
 
-        In degrees, for each frame, where times are not stated; None before the second attitude.
+        In degrees per frame, if times are not given; None before the second attitude.
         """
         return self._rate("")
 
@@ -102,16 +102,16 @@ class Track(Attitude):
 class Tracker:
     """Follow the attitude of a camera from frame to frame.
 
-    Where the attitude and the angular rate are known, only windows around predicted stars are
-    evaluated. The first two frames are solved in full, and each in which the stars are not where
-    they were predicted.
+    If the attitude and the angular rate are known, only windows around predicted stars are read.
+    The first two frames are solved in full, and so are frames whose stars are not at the predicted
+    positions.
 
     Parameters
     ----------
     pipeline : Pipeline, optional
-        Catalogue and camera; those of ``Pipeline()`` by default.
+        Catalog and camera; those of ``Pipeline()`` by default.
     stars : int
-        How many stars are measured at most in a frame.
+        Maximum number of stars to measure in a frame.
     dark, flat : image, optional
         What to subtract from each frame, and by what to divide, as for `Pipeline.solve`.
     **options
@@ -159,7 +159,7 @@ class Tracker:
             As for `Pipeline.solve`.
         time : Time, TimeDelta, Quantity or float, optional
             Middle of the exposure; a number is in seconds from any origin. Without it frames are
-            taken to have equal intervals, and rates are per frame.
+            assumed to have equal intervals, and rates are per frame.
 
         Raises
         ------

@@ -1,8 +1,8 @@
 """Archives of frames on Dask and object stores.
 
 A task is a part of the frames: it fetches them through fsspec, solves them, and writes its rows as
-two Parquet files. No result of a frame travels through the scheduler. A part that is written is
-never done again, so a run that was ended goes on where it was.
+two Parquet files. No result of a frame travels through the scheduler. Parts that are written are
+not repeated, so the same call continues a run that was stopped.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Archive:
         return dataframe.read_parquet(f"{self.out}/{table}", storage_options=self._options)
 
     def summary(self) -> list[dict[str, Any]]:
-        """Return what each camera saw in each night, as the JSON of ``starpipe archive report``."""
+        """Return a summary of each night and camera, as the JSON of ``starpipe archive report``."""
         parts = sorted(_written(self.out, self._options))
         read = (_fetch(f"{self.out}/{TABLES[0]}/{part}", self._options) for part in parts)
         nights: list[dict[str, Any]] = json.loads(_starpipe.archive_nights(read))
@@ -132,9 +132,9 @@ def process(
         A pattern (``s3://night/**/*.fits``), or the names of the frames: paths or URLs.
     out : str
         Where to write: a directory or a URL. It belongs to this list of frames and these arguments;
-        parts that are there already are not done again.
+        existing parts are not repeated.
     client : dask.distributed.Client, optional
-        Whose workers do it; without one, this process.
+        Client whose workers process the parts; without one, this process does.
     catalog : path, optional
         As for `Pipeline`; each worker must have it.
     camera : path, optional
@@ -223,7 +223,7 @@ def _claim(job: _Job, plan: _starpipe.ArchivePlan) -> None:
         for table in TABLES:
             if _again(lambda table=table: filesystem.exists(f"{root}/{table}")):  # type: ignore[misc]
                 raise ValueError(
-                    f"{job.out} has {table} and no archive.json, which would tell what run it is of"
+                    f"{job.out} has {table} but no archive.json: its run is unknown"
                 )
         _write(filesystem, path, plan.identity.encode(), is_new=True)
     found = _again(lambda: filesystem.cat_file(path)).decode()
@@ -412,7 +412,7 @@ _lock = threading.Lock()
 
 
 def _pipeline(job: _Job) -> _starpipe.Pipeline:
-    """Return the pipeline of this process: the catalogue is read once."""
+    """Return the pipeline of this process: the catalog is read once."""
     key = job.catalog, job.camera
     with _lock:
         if key not in _pipelines:

@@ -46,7 +46,7 @@ def test_files_that_cannot_be_read_are_named(pipeline, tmp_path):
         ({"fov": -1}, "fov must be more than 0"),
         ({"fov": "wide"}, "fov must be a number"),
         ({"fov": np.nan}, "fov must be a finite number"),
-        ({"fov": 10, "pixel_scale": 30}, "say the same"),
+        ({"fov": 10, "pixel_scale": 30}, "are alternatives"),
         ({"radius": 0}, "radius must be more than 0"),
         ({"near": (10, 95), "radius": 5}, "declination"),
         ({"near": 10, "radius": 5}, "SkyCoord or"),
@@ -118,7 +118,7 @@ def test_positions_that_are_no_stars_are_left_out_and_told(pipeline):
     assert [note[:5] for note in found.notes] == ["1 row"] * 4
     assert len(found.stars) == 2
     ordered = pipeline.identify(x, [1.0] * 6, shape=(100, 100))
-    assert "in order of brightness" in ordered.notes[-1] and len(ordered.notes) == 3
+    assert "sorted by brightness" in ordered.notes[-1] and len(ordered.notes) == 3
 
 
 def test_what_is_odd_about_a_catalogue_goes_to_the_logger(frame, tmp_path, caplog):

@@ -140,7 +140,7 @@ def test_the_best_radius_is_the_programs(program, camera):
         (lambda: sp.detect(np.zeros((2, 2))), "2 "),
         (lambda: sp.robustness(fov=200.0), "fov must be more than 0 and less than 179 deg"),
         (lambda: sp.robustness(missing=200.0), "missing must be from 0 to 100"),
-        (lambda: sp.defocus(vmag=5.0), "are of a camera"),
+        (lambda: sp.defocus(vmag=5.0), "need a camera"),
         (lambda: sp.darks([]), "frame"),
         (lambda: sp.flats([], camera=CAMERA), "frame"),
         (lambda: sp.flats([np.ones((9, 9)), np.ones((9, 8))], camera=CAMERA), "9|light"),

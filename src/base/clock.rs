@@ -93,7 +93,7 @@ pub enum UtcOffset {
 
 /// Why a text is no [`UtcOffset`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no offset; expected hours from -14 to 14, like 2 or -3.5, or auto")]
+#[error("'{0}' is not a UTC offset; expected hours from -14 to 14, like 2 or -3.5, or auto")]
 pub struct UtcOffsetError(String);
 
 /// Parses hours, or `auto`.

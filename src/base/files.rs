@@ -125,7 +125,7 @@ pub fn without_byte_order_mark(bytes: &[u8]) -> io::Result<&[u8]> {
 /// I/O errors, and `path` being a device, a pipe or a directory, which the rename would replace.
 pub fn beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        return Err(io::Error::other("it exists and is no regular file"));
+        return Err(io::Error::other("it exists and is not a regular file"));
     }
     let parent = path.parent().filter(|parent| *parent != Path::new(""));
     let mut builder = tempfile::Builder::new();

@@ -23,7 +23,7 @@ pub enum ImplausibleLens {
     },
     /// The axis of the lens is far from the frame.
     #[error(
-        "the axis of the lens is at ({x_px:.1}, {y_px:.1}) px; expected a place on the frame, or up to half its size beside it"
+        "the axis of the lens is at ({x_px:.1}, {y_px:.1}) px; expected a position on the frame, or outside it by up to half its size"
     )]
     Axis {
         /// Along the rows.
@@ -33,7 +33,7 @@ pub enum ImplausibleLens {
     },
     /// The picture is stretched.
     #[error(
-        "the focal lengths along two directions of the frame are as {ratio:.3} to 1; expected pixels that are square to 25 %"
+        "the ratio of the focal lengths along two directions of the frame is {ratio:.3}; expected square pixels, to 25 %"
     )]
     Stretch {
         /// The larger one over the other.
@@ -41,8 +41,7 @@ pub enum ImplausibleLens {
     },
     /// The distortion images two directions at one place.
     #[error(
-        "the distortion folds the picture {angle_deg:.2}° from the axis, at ({x_px:.0}, {y_px:.0}) px; expected one \
-         that does not, or an angle up to which the lens is known (valid_to_deg)"
+        "the distortion folds the picture {angle_deg:.2}° from the axis, at ({x_px:.0}, {y_px:.0}) px; reduce the distortion, or state the angle up to which the lens is known (valid_to_deg)"
     )]
     Fold {
         /// The last angle from the axis that is imaged there.

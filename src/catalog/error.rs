@@ -45,7 +45,7 @@ pub enum CatalogError {
     },
     /// The content is of no readable kind.
     #[error(
-        "{}: not a catalog that can be read: it begins with {found}; expected {expected}",
+        "{}: unknown catalog format: it begins with {found}; expected {expected}",
         path.display()
     )]
     UnknownKind {

@@ -22,7 +22,7 @@ impl StarIndex {
     /// # Panics
     /// If `index` is 2³² or more; no catalogue has as many stars.
     pub fn new(index: usize) -> Self {
-        Self(u32::try_from(index).expect("a catalogue has fewer than 2^32 stars"))
+        Self(u32::try_from(index).expect("a catalog has fewer than 2^32 stars"))
     }
 
     /// The index as a number.

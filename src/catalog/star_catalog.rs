@@ -36,7 +36,7 @@ impl Catalog {
         static BUILT_IN: std::sync::OnceLock<Catalog> = std::sync::OnceLock::new();
         BUILT_IN.get_or_init(|| {
             Self::from_compact(include_bytes!("../../catalogs/sky2000.bin"))
-                .expect("tests/it/catalog.rs checks the embedded catalogue")
+                .expect("tests/it/catalog.rs checks the embedded catalog")
         })
     }
 

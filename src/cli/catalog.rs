@@ -18,7 +18,7 @@ pub(crate) struct CatalogArgs {
 
 #[derive(Debug, Subcommand)]
 enum CatalogCommand {
-    /// Convert a catalogue from its published form into the compact form that --catalog loads
+    /// Convert a catalog from its published form into the compact form that --catalog loads
     /// fastest
     Import(ImportArgs),
 }
@@ -34,7 +34,7 @@ enum CatalogCommand {
     as 05:34:48.0), magnitude (vmag, mag, vtmag, phot_g_mean_mag, ...) and, if available, proper \
     motion (pmra, pmdec in mas a year) and epoch (ref_epoch).")]
 struct ImportArgs {
-    /// Catalogue to read, a file or a directory
+    /// Catalog to read, a file or a directory
     file: PathBuf,
     /// File to write
     #[arg(short, long, value_name = "OUT")]
@@ -85,7 +85,7 @@ fn check_output(output: &Path, sources: &[SourceFile]) -> Result<(), CommandErro
         .any(|source| is_same_file(&source.path, output))
     {
         return Err(CommandError::Usage(format!(
-            "the compact catalogue would overwrite the input {}; choose another file for --output",
+            "the compact catalog would overwrite the input {}; choose another file for --output",
             output.display()
         )));
     }

@@ -22,7 +22,7 @@ use clap::{Parser, Subcommand};
 /// The version with what it was built from.
 fn long_version() -> String {
     format!(
-        "{}\ncommit {}\ncatalogue SKY2000 version 5 revision 4, built in",
+        "{}\ncommit {}\ncatalog SKY2000 version 5 revision 4, built in",
         env!("CARGO_PKG_VERSION"),
         option_env!("STARPIPE_COMMIT").unwrap_or("unknown")
     )
@@ -41,7 +41,7 @@ fn long_version() -> String {
         starpipe night.tif\n  \
         starpipe process --fov 11.4 --format json *.tif > night.jsonl\n  \
         starpipe identify --pixel-scale 10.8 centroids.csv\n\n\
-        Without a command, frames are processed: starpipe night.tif is starpipe process night.tif.\n\
+        Without a command, frames are processed: starpipe night.tif means starpipe process night.tif.\n\
         Exit status: 0 every frame was identified, 1 something could not be read or written,\n\
         2 the command line is wrong, 3 at least one frame was not identified."
 )]
@@ -54,16 +54,16 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find and identify the stars in frames (FITS, TIFF, PNG, JPEG, BMP, PGM)
     Process(Box<ProcessArgs>),
-    /// Measure the sky in frames: brightness, extinction, clouds, and how faint stars go at each place
+    /// Measure sky brightness, extinction, clouds and limiting magnitude in each part of the sky
     #[command(after_help = "Examples:\n  \
         starpipe sky --site 52.22,4.42 --dark master-dark.fits night.fits\n  \
         starpipe sky --site 52.22,4.42 --camera camera.toml --format json night.fits > sky.jsonl\n\n\
-        The options are those of `starpipe process`, and the report is the same with the sky added; --out also\n\
-        writes FRAME.sky.svg. With site and time the sky of a wide field is divided by altitude and azimuth,\n\
-        else by columns and rows of the frame. The brightness needs the level of a pixel without light: --dark\n\
-        or --camera.")]
+        Options and report are those of `starpipe process`, with the sky added. --out also writes FRAME.sky.svg.\n\
+        If site and time are known, the sky of a wide field is divided by altitude and azimuth, otherwise by\n\
+        columns and rows of the frame. The brightness needs the dark level (bias and dark current): --dark or\n\
+        --camera. It is measured in the frame if an all-sky lens leaves the corners unlit.")]
     Sky(Box<ProcessArgs>),
-    /// Measure a night of one camera on its mount: sky, clouds, limits, pointing, and what changes when
+    /// Measure a night of a fixed camera: sky, clouds, limiting magnitude, pointing, and when they changed
     Night(Box<NightArgs>),
     /// Show the progress of an archive run, merge its tables, and report each night
     Archive(ArchiveArgs),
@@ -73,24 +73,24 @@ pub(crate) enum Command {
     Track(Box<TrackArgs>),
     /// Measure the lens of a camera in several of its frames
     Calibrate(Box<CalibrateArgs>),
-    /// Convert star catalogues
+    /// Convert star catalogs
     Catalog(CatalogArgs),
     /// Predict the faintest star that a camera detects
     Limit(Box<LimitArgs>),
     /// Write and list descriptions of cameras
     Camera(CameraArgs),
-    /// Repeat an experiment of the sensitivity paper: its limit, its stars, and frames like its own
+    /// Repeat an experiment of the sensitivity paper: its limiting magnitude, its stars, and simulated frames
     Experiment(ExperimentArgs),
-    /// Simulate frames of a camera, with tables of what is on them
+    /// Simulate frames of a camera, with tables of the stars and other objects in them
     Simulate(Box<SimulateArgs>),
     /// Simulate and process thousands of frames, and compare the results with the truth and with
     /// theory
     Validate(Box<ValidateArgs>),
-    /// Simulate lenses, spots and detectors that are not what the pipeline assumes, and compare the results with
+    /// Simulate lenses, spots and detectors that differ from the pipeline's model, and compare the results with
     /// the truth
     #[command(hide = true)]
     ValidateHard(Box<HardArgs>),
-    /// Simulate skies over an all-sky camera that looks at the zenith, and compare what `starpipe sky` measures with
+    /// Simulate skies over an all-sky camera that points to the zenith, and compare what `starpipe sky` measures with
     /// the truth
     #[command(hide = true)]
     ValidateSky(Box<SkyArgs>),
@@ -98,7 +98,7 @@ pub(crate) enum Command {
     #[command(hide = true, alias = "robustness")]
     ValidateRobustness(RobustnessArgs),
     /// Measure how often names are wrong, on simulated frames with foliage, clouds, trails and the
-    /// like, and whether pictures of no sky are identified
+    /// like, and whether pictures without sky are identified
     #[command(hide = true, alias = "clutter")]
     ValidateClutter(Box<ClutterArgs>),
     /// Find the spot radius with the smallest centroid error, and the defocus that gives it

@@ -88,7 +88,7 @@ impl FlatsArgs {
         let sheet = self.camera.as_deref().map(DataSheet::read).transpose()?;
         let dark = self.dark.as_deref().map(read_master).transpose()?;
         if sheet.is_none() && dark.is_none() {
-            report_warning("the level without light is assumed to be 0: give --dark or --camera");
+            report_warning("the dark level is assumed to be 0: give --dark or --camera");
         }
         Ok(FlatConfig {
             dark: dark.map(|dark| (dark.name, dark.frame)),

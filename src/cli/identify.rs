@@ -17,18 +17,18 @@ use std::path::PathBuf;
     starpipe process --format csv a.fits b.fits > stars.csv; starpipe identify --frame a.fits stars.csv\n\n\
     The columns are x,y (or x_px,y_px) and one of vmag (Johnson V), mag (instrumental) or flux, or as\n\
     photutils, SEP and SExtractor name them; others are ignored. The tables of starpipe process are read\n\
-    with their errors and flags. (0, 0) is the centre of the top-left pixel, y points down.")]
+    with their errors and flags. (0, 0) is the center of the top-left pixel, y points down.")]
 pub(crate) struct IdentifyArgs {
     /// Lists of centroids to identify; - for standard input
     #[arg(value_name = "CENTROIDS.csv", required = true)]
     lists: Vec<PathBuf>,
-    /// Width of the frame in pixels [default: that of --camera, else as far as the centroids reach]
+    /// Width of the frame in pixels [default: that of --camera, else the extent of the centroids]
     #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
     width: Option<u32>,
-    /// Height of the frame in pixels [default: that of --camera, else as far as the centroids reach]
+    /// Height of the frame in pixels [default: that of --camera, else the extent of the centroids]
     #[arg(long, value_name = "PIXELS", help_heading = "Frame", value_parser = clap::value_parser!(u32).range(1..=MAX_SIDE_PX))]
     height: Option<u32>,
-    /// Frame whose rows to use, in a table of starpipe process of several frames
+    /// Frame whose rows to use, if a table of starpipe process has several frames
     #[arg(long, value_name = "NAME", help_heading = "Frame")]
     frame: Option<String>,
     #[command(flatten)]

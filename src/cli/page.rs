@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct HtmlOption {
-    /// Also write a page to look at in a browser: the answer and its doubts, figures and tables in one file
+    /// Also write a page for a browser: the result, its notes, figures and tables in one file
     /// [default FILE: named as the command, beside the other results]
     #[arg(long, value_name = "FILE.html", require_equals = true, value_parser = page_name)]
     html: Option<Option<PathBuf>>,

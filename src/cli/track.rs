@@ -29,18 +29,18 @@ use std::time::Instant;
     starpipe track --interval 0.1 night/ > track.jsonl\n  \
     starpipe track --fov 20 --max-stars 20 --format text night-*.tif\n  \
     inotifywait -m -e close_write --format %w%f night | starpipe track --interval 0.1 -\n\n\
-    The first two frames are solved in full, and every frame in which the stars are not where they were\n\
-    predicted; in others only windows around predicted stars are read. The line of a frame is printed as soon\n\
-    as it is known.\n\n\
+    The first two frames are solved in full. In later frames only windows around predicted stars are read; if\n\
+    the stars are not there, the frame is solved in full. The line of a frame is printed as soon as it is\n\
+    processed.\n\n\
     Exit status: 0 every frame has an attitude, 1 something could not be read, 2 the command line is wrong,\n\
     3 at least one frame has no attitude.")]
 pub(crate) struct TrackArgs {
-    /// Frames in the order of their times; a directory stands for the frames in it, - for a list of
-    /// files on standard input, one a line, which are read as the lines come
+    /// Frames in the order of their times; a directory means all frames in it, - a list of files on
+    /// standard input, one per line, which are read as the lines arrive
     #[arg(value_name = "FRAME", required = true)]
     frames: Vec<PathBuf>,
-    /// Time from frame to frame, in seconds [default: from the dates in the files' headers, where
-    /// these have fractions of a second or are 10 s apart; else unknown, and rates are per frame]
+    /// Time from frame to frame, in seconds [default: from the dates in the files' headers, if they
+    /// have fractions of a second or are 10 s apart; else unknown, and rates are per frame]
     #[arg(long, value_name = "SECONDS", value_parser = values::positive, allow_hyphen_values = true)]
     interval: Option<f64>,
     /// Maximum number of stars to measure in a frame
@@ -65,7 +65,7 @@ pub(crate) fn track(arguments: &TrackArgs) -> Result<CommandOutput, CommandError
     let names = arguments.frames.iter().filter(|name| is_stdin(name));
     if names.count() > 1 {
         return Err(CommandError::usage(
-            "- stands for the list on standard input, which can be read only once; it is given twice",
+            "- is the list on standard input, which can be read only once; it is given twice",
         ));
     }
     let options = with_stated(arguments.hints.options()?, &arguments.exposure)?;

@@ -28,12 +28,11 @@ pub enum DetectError {
         found: usize,
     },
     /// The work was ended early.
-    #[error("not done within the time limit of a frame")]
+    #[error("not finished within the time limit for a frame")]
     Interrupted(#[from] Interrupted),
     /// More pixels stand out than fit the memory that the workspace allows.
     #[error(
-        "more than {most} pixels stand out from the background, for which there is not memory enough: \
-         fewer do with a higher threshold"
+        "more than {most} pixels are above the detection threshold, which needs too much memory: use a higher threshold"
     )]
     TooCrowded {
         /// How many may stand out.

@@ -181,7 +181,7 @@ fn pages_found(pages: usize) -> String {
 fn files_found(files: usize) -> String {
     match files {
         0 => "no file".to_owned(),
-        1 => "1 file that is no image".to_owned(),
-        _ => format!("{files} files that are no images"),
+        1 => "1 file that is not an image".to_owned(),
+        _ => format!("{files} files that are not images"),
     }
 }

@@ -73,11 +73,11 @@ impl fmt::Display for Assumption {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::FourPlanes => f.write_str(
-                "four planes were read as red, green, blue and one that is not used; a page chooses one of them",
+                "four planes were read as red, green, blue and one that is ignored; page selects a single plane",
             ),
             Self::DayFirst { keyword, found } => write!(
                 f,
-                "{keyword} may be read in two ways: found {found}, read as day, month, year"
+                "{keyword} is ambiguous: found {found}, read as day, month, year"
             ),
         }
     }
@@ -109,7 +109,7 @@ impl fmt::Display for ImageChoice {
         };
         write!(
             f,
-            "the largest of {} images in the file is the frame: {attached}page {}, of {width} × {height} pixels; \
+            "the largest of {} images in the file was read: {attached}page {}, of {width} × {height} pixels; \
              the first has {first_width} × {first_height}",
             self.images, self.page
         )
@@ -231,7 +231,7 @@ impl FrameMetadata {
             self.ignore(
                 keywords,
                 text,
-                "a site, and not that at 0, 0, which means that none is set",
+                "a site other than 0, 0, which means that it is not set",
             );
             return None;
         }

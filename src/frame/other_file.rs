@@ -69,12 +69,12 @@ impl OtherFile {
             Self::Calibration => ["dark, bias or flat", "darks, biases or flats"],
             Self::Video => ["video", "videos"],
             Self::OtherFormat => [
-                "file in a format that is not read",
-                "files in formats that are not read",
+                "file in an unsupported format",
+                "files in unsupported formats",
             ],
-            Self::NoImage => ["file that is no image", "files that are no images"],
+            Self::NoImage => ["file that is not an image", "files that are not images"],
             Self::Hidden => ["hidden file", "hidden files"],
-            Self::Product => ["product of starpipe", "products of starpipe"],
+            Self::Product => ["result of starpipe", "results of starpipe"],
         }
     }
 

@@ -257,7 +257,7 @@ pub(super) fn unsupported(format: FrameFormat, found: String) -> FrameError {
     FrameError::Unsupported {
         format,
         found,
-        expected: "8 or 16 bits per sample, grey or color",
+        expected: "8 or 16 bits per sample, gray or color",
     }
 }
 

@@ -195,19 +195,19 @@ pub enum SearchFailure {
         needed: usize,
     },
     /// No hypothesis reached the required false-alarm probability.
-    #[error("no pointing agrees with the stars well enough")]
+    #[error("no pointing matches the stars well enough")]
     NoMatch {
         /// log10 of the false-alarm probability of the best hypothesis, if there was one.
         best_log10_false_alarm: Option<f64>,
     },
     /// A pointing was found, but too few stars have a sure name under it.
-    #[error("a pointing agrees with the brightest stars, and too few stars confirm it by name")]
+    #[error("a pointing matches the brightest stars, but too few other stars confirm it")]
     NotConfirmed {
         /// log10 of its false-alarm probability.
         log10_false_alarm: f64,
     },
     /// The search was ended early ([`Workspace::with_interrupt`](super::Workspace::with_interrupt)).
-    #[error("the search was ended before it was complete")]
+    #[error("the search was interrupted")]
     Interrupted,
 }
 

@@ -18,7 +18,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// There is no limit: noise alone is detected more often than not.
-    #[error("there is no limiting magnitude: noise alone is detected at half of all places")]
+    #[error("there is no limiting magnitude: noise alone is detected at half of all positions")]
     NoLimit,
     /// A frame cannot be simulated or recorded.
     #[error("simulating a frame")]

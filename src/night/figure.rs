@@ -44,7 +44,7 @@ const PLOTS: [Plot; 5] = [
         bounds: None,
     },
     Plot {
-        title: "Sky behind clouds",
+        title: "Cloud cover",
         unit: "%",
         layers: &[NightPlotLayer {
             name: "",
@@ -74,7 +74,7 @@ const PLOTS: [Plot; 5] = [
                 value: |row| (row.expected_limit_vmag, None),
             },
             NightPlotLayer {
-                name: "unaided eye",
+                name: "naked eye",
                 color: Rgb::GREEN,
                 value: |row| (row.naked_eye_limit_vmag, None),
             },
@@ -82,7 +82,7 @@ const PLOTS: [Plot; 5] = [
         bounds: None,
     },
     Plot {
-        title: "Loss of light",
+        title: "Extinction and dimming",
         unit: "mag",
         layers: &[
             NightPlotLayer {
@@ -97,7 +97,7 @@ const PLOTS: [Plot; 5] = [
                 },
             },
             NightPlotLayer {
-                name: "stars dimmer than at their best",
+                name: "dimming since the clearest frames",
                 color: Rgb::ORANGE,
                 value: |row| (row.dimming_mag, None),
             },
@@ -105,7 +105,7 @@ const PLOTS: [Plot; 5] = [
         bounds: None,
     },
     Plot {
-        title: "Standard deviation of a star's spot",
+        title: "Spot size of stars (standard deviation)",
         unit: "px",
         layers: &[NightPlotLayer {
             name: "",
@@ -141,7 +141,7 @@ pub fn svg(rows: &[NightRow], night: &NightSummary) -> Option<String> {
     let notes = numbered.map(|(number, of)| format!("{number}: {}, {}", of.date, of.to_text()));
     let mut notes: Vec<String> = notes.collect();
     notes.push(
-        "Background: orange in twilight, violet while the Moon is up, darker as more of it is lit."
+        "Background: orange in twilight, violet while the Moon is up, darker near full Moon."
             .to_owned(),
     );
     let sheet = Sheet {

@@ -64,7 +64,7 @@ impl MomentKind {
             Self::Knock => "the camera was moved",
             Self::Dew => "dew",
             Self::Focus => "focus drifts",
-            Self::Dimming => "stars dim all over",
+            Self::Dimming => "stars dim over the whole sky",
         }
     }
 }

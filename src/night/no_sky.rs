@@ -36,7 +36,7 @@ impl NoSky {
     /// In words, for one and for several.
     pub const fn text(self) -> [&'static str; 2] {
         match self {
-            Self::Day => ["frame of the day", "frames of the day"],
+            Self::Day => ["daytime frame", "daytime frames"],
             Self::Startrails => ["picture of star trails", "pictures of star trails"],
             Self::Dark => ["dark", "darks"],
         }

@@ -131,20 +131,20 @@ impl Limit {
 pub enum NoLimit {
     /// Completeness does not fall before the catalogue ends.
     #[error(
-        "the catalogue ends before completeness falls: too few of its stars are too faint for the frame"
+        "the catalog is not deep enough: too few of its stars are fainter than the limit of the frame"
     )]
     CatalogEnds,
     /// Too few stars are bright enough.
-    #[error("too few of the catalogue's stars are bright enough for the frame")]
+    #[error("too few catalog stars in the field are bright enough to be detected")]
     TooFewDetected,
     /// There are more detections than may be measured.
-    #[error("only the brightest {measured} detections were measured: the frame shows fainter ones")]
+    #[error("not known, because only the brightest {measured} detections were measured")]
     StarsLeftOut {
         /// How many were measured.
         measured: usize,
     },
     /// The fall is not clear.
-    #[error("too few stars to tell where completeness falls")]
+    #[error("too few stars to measure the magnitude at which half of them are detected")]
     Uncertain,
 }
 

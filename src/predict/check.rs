@@ -23,8 +23,7 @@ pub enum ScenarioError {
     Contradiction(String),
     /// The limiting magnitude is not finite.
     #[error(
-        "there is no limiting magnitude: with {star_photons_s_m2:e} photons of a star of V = 0 below the air per second and \
-         m², {background_e:e} electrons of the sky and a noise of {noise_e:e} electrons it would be {limit_vmag}"
+        "there is no limiting magnitude: with {star_photons_s_m2:e} photons per second and m² from a star of V = 0 below the atmosphere, {background_e:e} electrons of sky background and a noise of {noise_e:e} electrons it would be {limit_vmag}"
     )]
     NoLimit {
         /// Its value.

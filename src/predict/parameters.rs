@@ -15,7 +15,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     ),
     Key {
         name: "sky_mag_arcsec2",
-        about: "brightness of the sky, in V magnitudes in a square arcsecond",
+        about: "brightness of the sky, in V magnitudes per square arcsecond",
         limits: NumberRange::Finite,
         get: |conditions| Some(conditions.sky.mag_arcsec2()),
         set: |conditions, mag| conditions.sky = SkyBrightness::MagArcsec2(mag),
@@ -36,14 +36,14 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     },
     Key {
         name: "zenith_transmission",
-        about: "part of the light of 555 nm that comes through one airmass, by the law of eq. (3)",
+        about: "transmission of one airmass at 555 nm, by the law of eq. (3)",
         limits: NumberRange::Share,
         get: |conditions| Some(conditions.extinction.zenith_transmission(REFERENCE_NM)),
         set: |conditions, part| conditions.extinction = Extinction::law_through(part),
     },
     Key {
         name: "extinction_mag_per_airmass",
-        about: "extinction, in magnitudes for each airmass, the same at every wavelength",
+        about: "extinction, in magnitudes per airmass, the same at every wavelength",
         limits: NumberRange::NotNegative,
         get: |conditions| match conditions.extinction {
             Extinction::MagPerAirmass(mag) => Some(mag),
@@ -59,17 +59,17 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     key!(
         motion_px,
         NumberRange::FromToBelow(0.0, 100.0),
-        "how far a star moves during the exposure, in pixels"
+        "motion of a star during the exposure, in pixels"
     ),
     key!(
         snr,
         NumberRange::Positive,
-        "signal over noise in the brightest pixel that counts as a detection"
+        "signal-to-noise ratio in the brightest pixel required for a detection"
     ),
     key!(
         false_alarms_per_mpx,
         NumberRange::Positive,
-        "false detections in a million pixels that the detector accepts"
+        "accepted false detections per million pixels"
     ),
 ];
 
@@ -158,7 +158,7 @@ const EXCLUSIVE: &[&[&str]] = &[
 
 /// There is no parameter of this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is no parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
+#[error("'{name}' is not a parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
 pub struct UnknownParameter {
     /// The name.
     pub name: String,
@@ -294,7 +294,7 @@ mod tests {
         let error = Parameter::named("aperture").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "'aperture' is no parameter; did you mean 'aperture_mm'?"
+            "'aperture' is not a parameter; did you mean 'aperture_mm'?"
         );
     }
 

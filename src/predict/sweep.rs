@@ -261,7 +261,7 @@ mod tests {
         for (found, expected) in [
             (
                 sweep("apertur", 5.0, 200.0, 40),
-                "'apertur' is no parameter; did you mean 'aperture_mm'?",
+                "'apertur' is not a parameter; did you mean 'aperture_mm'?",
             ),
             (
                 sweep("aperture_mm", 200.0, 5.0, 40),

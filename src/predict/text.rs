@@ -140,7 +140,7 @@ fn faintest_text(faintest: &Faintest) -> String {
     let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
     format!(
         "    {:<36} {found:>40}\n    {:<36} {expected:>40}\n",
-        "catalogue's stars found in the field", "faintest of them to be expected at V",
+        "catalog's stars found in the field", "faintest of them to be expected at V",
     )
 }
 
@@ -169,11 +169,11 @@ fn camera(prediction: &Prediction) -> Vec<Line> {
             ("f", "focal length", "focal_length_mm", "mm"),
             (
                 "K",
-                "transmission of the lens, at most",
+                "peak transmission of the lens",
                 "lens_transmission",
                 "",
             ),
-            ("Q", "quantum efficiency, at most", "quantum_efficiency", ""),
+            ("Q", "peak quantum efficiency", "quantum_efficiency", ""),
             ("", "pixel area", "pixel_area_um2", "µm²"),
             ("", "spot, standard deviation", "spot_sigma_px", "px"),
             ("", "dark current", "dark_current_e_s", "e/s"),
@@ -201,7 +201,7 @@ fn conditions(prediction: &Prediction) -> Vec<Line> {
                 "sky_mag_arcsec2",
                 "mag/arcsec²",
             ),
-            ("R_SN", "signal over noise that is wanted", "snr", ""),
+            ("R_SN", "required signal-to-noise ratio", "snr", ""),
         ],
     )
 }
@@ -212,7 +212,7 @@ fn on_the_way(budget: &Budget) -> Vec<Line> {
         ("X", "airmass", budget.airmass, ""),
         (
             "",
-            "part of a star's electrons that the air leaves",
+            "transmission of the atmosphere, for a star's electrons",
             through_air,
             "",
         ),
@@ -242,7 +242,7 @@ fn on_the_way(budget: &Budget) -> Vec<Line> {
         ),
         (
             "Φ₀",
-            "photons of V = 0 above the air",
+            "photons of V = 0 above the atmosphere",
             budget.mag_0_photons_s_m2,
             "/ s m²",
         ),
@@ -257,15 +257,15 @@ fn on_the_way(budget: &Budget) -> Vec<Line> {
 }
 
 fn noise(budget: &Budget) -> Vec<Line> {
-    let of_sensor = "noise of the sensor: dark current, reading, rounding";
+    let of_sensor = "noise of the sensor: dark current, readout, rounding";
     vec![
         ("B", "electrons of the sky", budget.background_e, "e"),
         ("n_B", "their shot noise", budget.sky_noise_e, "e"),
         ("", "electrons of the dark current", budget.dark_e, "e"),
-        ("", "noise of reading", budget.read_noise_e, "e"),
+        ("", "read noise", budget.read_noise_e, "e"),
         (
             "",
-            "noise of rounding to grey levels",
+            "rounding noise (quantization)",
             budget.quantisation_noise_e,
             "e",
         ),
@@ -277,7 +277,7 @@ fn noise(budget: &Budget) -> Vec<Line> {
             "e",
         ),
         ("n_S", "shot noise of the star", budget.star_noise_e, "e"),
-        ("N", "all noise", budget.noise_e, "e"),
+        ("N", "total noise", budget.noise_e, "e"),
     ]
 }
 
@@ -293,14 +293,14 @@ fn faintest_star(budget: &Budget) -> Vec<Line> {
         ("M_V", "its magnitude", budget.limit_vmag, ""),
         (
             "E",
-            "its illuminance above the air",
+            "its illuminance above the atmosphere",
             budget.star_illuminance_lx,
             "lx",
         ),
-        ("E'", "its illuminance below the air", below, "lx"),
+        ("E'", "its illuminance below the atmosphere", below, "lx"),
         (
             "φ_S",
-            "its photons below the air",
+            "its photons below the atmosphere",
             budget.star_photons_s_m2,
             "/ s m²",
         ),

@@ -192,7 +192,7 @@ impl LensReport {
             );
         }
         for frame in &self.left_out {
-            let _ = writeln!(text, "  {} is left out: {}", frame.frame, frame.text);
+            let _ = writeln!(text, "  {} was not used: {}", frame.frame, frame.text);
         }
         text
     }
@@ -203,17 +203,17 @@ impl LensReport {
         if self.directions < self.frames.len() {
             let _ = write!(
                 text,
-                " for {} frames; what these have in common, {:.3} px, counts once",
+                " for {} frames; errors of {:.3} px are common to frames of one direction",
                 self.frames.len(),
                 self.common_sigma_px
             );
         }
         if self.directions == 1 {
-            text += "; how the lens differs in others is not in its errors";
+            text += "; the stated errors do not include differences between directions";
         } else if self.direction_scatter > 1.0 {
             let _ = write!(
                 text,
-                "; they differ by {:.2} of the errors, which are as much larger",
+                "; they differ by {:.2} standard errors, and the stated errors are increased by this factor",
                 self.direction_scatter
             );
         }
@@ -225,8 +225,8 @@ impl LensReport {
         let lens = &self.lens;
         let mirrored = if lens.mirrored { ", mirrored" } else { "" };
         let known = lens.valid_to_deg.map_or_else(
-            || "known up to the corners".to_owned(),
-            |to_deg| format!("known up to {to_deg:.2}° from the axis"),
+            || "measured up to the corners".to_owned(),
+            |to_deg| format!("measured up to {to_deg:.2}° from the axis"),
         );
         let mut lines = vec![
             (
@@ -246,7 +246,7 @@ impl LensReport {
             (
                 "residuals",
                 format!(
-                    "{:.3} px on each axis, {:.3} px of stars left out of the fit; {:.3} px not explained by the centroids",
+                    "{:.3} px on each axis, {:.3} px for stars not used in the fit; {:.3} px not explained by centroid errors",
                     self.rms_px, self.held_out_rms_px, self.excess_sigma_px
                 ),
             ),
@@ -267,7 +267,7 @@ impl LensReport {
             lines.push((
                 "drift",
                 format!(
-                    "of the scale {:+.2} ± {:.2} ppm a day; scatter of the frames {:.2} of their errors",
+                    "scale {:+.2} ± {:.2} ppm per day; scatter of the frames {:.2} standard errors",
                     drift.scale_ppm_per_day, drift.sigma_ppm_per_day, drift.scatter
                 ),
             ));
@@ -276,7 +276,7 @@ impl LensReport {
             lines.push((
                 "mount",
                 format!(
-                    "altitude {:.3}°, azimuth {:.3}°, image up {:+.3}° from the vertical; within {:.1}″",
+                    "altitude {:.3}°, azimuth {:.3}°, image up {:+.3}° from the vertical; frames agree within {:.1}″",
                     mount.altitude_deg, mount.azimuth_deg, mount.tilt_deg, mount.scatter_arcsec
                 ),
             ));

@@ -55,7 +55,7 @@ impl PredictionReport {
         let known = if self.zenith_distance_known {
             ""
         } else {
-            ", taken to be at the zenith"
+            ", zenith assumed"
         };
         let mut lines = vec![labelled(
             "camera",
@@ -86,10 +86,10 @@ impl PredictionReport {
     fn light_line(&self) -> Option<String> {
         let zero_point = self.zero_point_difference_mag.map(|mag| {
             let off = difference(mag, self.zero_point_difference_sigma_mag);
-            format!("zero point {off} mag off the camera's")
+            format!("zero point {off} mag from the predicted one")
         });
         let sky = self.sky_mag_arcsec2.or(self.sky_camera_mag_arcsec2);
-        let sky = sky.map(|mag| format!("sky V {mag:.2} in a square arcsecond"));
+        let sky = sky.map(|mag| format!("sky V {mag:.2} mag/arcsec²"));
         let text: Vec<String> = zero_point.into_iter().chain(sky).collect();
         (!text.is_empty()).then(|| labelled("", &text.join("; ")))
     }
@@ -97,7 +97,7 @@ impl PredictionReport {
 
 fn expected_line(magnitude: &MagnitudeReport) -> Option<String> {
     let text = format!(
-        "faintest V {:.2} ± {:.2}; found minus expected {:+.2}",
+        "faintest star V {:.2} ± {:.2}; measured minus predicted {:+.2}",
         magnitude.expected_faintest_vmag?,
         magnitude.expected_faintest_sigma_mag?,
         magnitude.faintest_difference_mag?,

@@ -18,7 +18,7 @@ impl SkyReport {
             lines.push(labelled(
                 "zenith",
                 &format!(
-                    "{:.2} ± {:.2} mag/arcsec² (V), {color}{:.2} mcd/m²; to the eye V {:.1}, Bortle {}",
+                    "{:.2} ± {:.2} mag/arcsec² (V), {color}{:.2} mcd/m²; naked-eye limit V {:.1}, Bortle {}",
                     zenith.mag_arcsec2,
                     zenith.sigma_mag,
                     zenith.luminance_mcd_m2,
@@ -38,22 +38,24 @@ impl SkyReport {
             self.dark_level_adu,
             self.dark_level_sigma_adu,
         ) {
-            let text = format!("{level:.1} ± {sigma:.1} ADU, by pixels outside the lens's circle");
-            lines.push(labelled("no light", &text));
+            let text = format!(
+                "{level:.1} ± {sigma:.1} ADU, measured outside the image circle of the lens"
+            );
+            lines.push(labelled("dark level", &text));
         }
         if self.dark_level_source == Some("darkest") {
-            let text = "its level is not known, but no higher than the darkest part of the frame";
-            lines.push(labelled("no light", text));
+            let text = "not known; assumed to be between 0 and the darkest part of the frame";
+            lines.push(labelled("dark level", text));
         }
         if let Some(tone) = &self.tone_curve {
             let text = format!(
-                "levels go as light to the power {:.2} ± {:.2} by stars; the brightness contains this error",
+                "the level of the sky grows as the power {:.2} ± {:.2} of its light, measured with stars; the errors include this",
                 tone.exponent, tone.exponent_sigma
             );
             lines.push(labelled("tone curve", &text));
         }
         if let Some(why) = self.no_brightness_text {
-            lines.push(labelled("sky", &format!("no brightness: {why}")));
+            lines.push(labelled("sky", &format!("brightness not measured: {why}")));
         }
         if let (Some(mag), Some(sigma)) =
             (self.extinction_mag_per_airmass, self.extinction_sigma_mag)
@@ -61,7 +63,7 @@ impl SkyReport {
             let source = if self.extinction_measured {
                 counted(self.stars, "star")
             } else {
-                "little is seen of it; mostly as is usual".to_owned()
+                "mostly the assumed typical value; the stars constrain it little".to_owned()
             };
             let text = format!("{mag:.3} ± {sigma:.3} mag per airmass ({source})");
             lines.push(labelled("extinction", &text));
@@ -78,7 +80,7 @@ impl SkyReport {
         if !differences.is_empty() {
             let mean = differences.iter().sum::<f64>() / differences.len() as f64;
             let text = format!(
-                "{mean:+.2} mag measured − expected, in {} clear cells",
+                "measured minus expected {mean:+.2} mag, mean of {} clear cells",
                 differences.len()
             );
             lines.push(labelled("limits", &text));

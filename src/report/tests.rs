@@ -48,6 +48,9 @@ fn unidentified() -> FrameReport {
         exposure_s: None,
         notes: Vec::new(),
         status: Status::NotIdentified,
+        sentence: None,
+        constellations: Vec::new(),
+        annotations: Vec::new(),
         reason: Some(
             "no arrangement of catalogue stars matches the 12 detections; if this is the sky, the field \
              of view and the direction, where known, make it easier"

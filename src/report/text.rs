@@ -106,17 +106,17 @@ impl FrameReport {
                 let zone = if is_assumed { "" } else { " UTC" };
                 let utc = date.iso.replace('T', " ").replace('Z', zone);
                 let offset = offset_text(date);
-                format!("{utc}, {source}{offset}: positions for that date")
+                format!("{utc}, {source}{offset}: star positions for that date")
             }
             None => {
                 let see = names.see(&[Remedy::Date]);
                 let error = match self.status {
                     Status::Identified => {
-                        ", without aberration, and the error of the focal length includes that"
+                        ", aberration is not corrected, and the error of the focal length allows for it"
                     }
                     Status::NotIdentified => "",
                 };
-                format!("no date: positions for J2000.0{error}{see}")
+                format!("unknown: star positions of J2000.0{error}{see}")
             }
         };
         labelled("date", &text)
@@ -125,7 +125,7 @@ impl FrameReport {
     fn background_line(&self) -> Option<String> {
         let (level, noise) = (self.background.level?, self.background.noise?);
         let decimals = decimals_for(noise, 6);
-        let text = format!("{level:.decimals$}, noise {noise:.decimals$} in one pixel");
+        let text = format!("{level:.decimals$}, noise {noise:.decimals$} per pixel");
         Some(labelled("background", &text))
     }
 
@@ -133,10 +133,10 @@ impl FrameReport {
     fn sky_line(&self) -> Option<String> {
         let share = self.background.sky_share.filter(|share| *share < 0.99)?;
         let text = format!(
-            "{:.0} % of the frame; something is in front of the rest, or it is masked",
+            "{:.0} % of the frame; the rest is masked, or hidden by trees, houses or the like",
             100.0 * share
         );
-        Some(labelled("sky", &text))
+        Some(labelled("visible sky", &text))
     }
 
     fn timing_line(&self) -> String {
@@ -183,10 +183,10 @@ impl FrameReport {
 fn offset_text(date: &DateReport) -> String {
     let hours = date.utc_offset_h.unwrap_or_default();
     match date.utc_offset_source {
-        Some("option") => format!(", {hours} h ahead of UTC as given"),
-        Some("stars") => format!(", {hours} h ahead of UTC by the stars"),
-        Some("assumed") => ", taken for UTC".to_owned(),
-        Some("contradicted") => ", contradicted by the stars or the site is".to_owned(),
+        Some("option") => format!(", local time {hours} h ahead of UTC as given"),
+        Some("stars") => format!(", local time {hours} h ahead of UTC as measured with the stars"),
+        Some("assumed") => ", assumed to be UTC".to_owned(),
+        Some("contradicted") => " (the stars contradict this time or the site)".to_owned(),
         _ => String::new(),
     }
 }
@@ -202,7 +202,7 @@ fn observation_line(seen: &ObservationReport) -> String {
             seen.zenith_distance_deg
         ),
     };
-    labelled("sky", &text)
+    labelled("direction", &text)
 }
 
 fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
@@ -218,7 +218,7 @@ fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
     let roll_decimals = decimals_for(roll_sigma_deg, 6);
     vec![
         labelled(
-            "centre",
+            "center",
             &format!("RA {ra}  Dec {dec}  ± {}", format::small(sigma_arcsec)),
         ),
         labelled(
@@ -290,7 +290,7 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
     let limit = photometry.limit50_vmag.zip(photometry.limit50_sigma_mag);
     let limit_text = match (limit, &photometry.limit50_reason) {
         (Some((vmag, sigma)), _) => {
-            format!("V {vmag:.2} ± {sigma:.2}, where half of the catalogue's stars are detected")
+            format!("V {vmag:.2} ± {sigma:.2}, where half of the catalog's stars are detected")
         }
         (None, reason) => reason.clone().unwrap_or_default(),
     };
@@ -299,7 +299,7 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
         .zip(photometry.zero_point_sigma_mag);
     let mut text = match zero_point {
         Some((vmag, sigma)) => format!(
-            "V {vmag:.3} ± {sigma:.3} is 1 {}; {} scatter by {:.2}",
+            "V {vmag:.3} ± {sigma:.3} for 1 {}; {}, scatter {:.2} mag",
             photometry.flux_unit,
             counted(photometry.zero_point_stars, "star"),
             photometry.scatter_mag.unwrap_or(f64::NAN),
@@ -310,7 +310,7 @@ fn photometry_lines(photometry: &PhotometryReport) -> Vec<String> {
             .map_or_else(String::new, |reason| reason.text.clone()),
     };
     if let Some((term, sigma)) = photometry.color_term.zip(photometry.color_term_sigma) {
-        text += &format!("; {term:+.2} ± {sigma:.2} (B−V − 0.6)");
+        text += &format!("; color term {term:+.2} ± {sigma:.2}");
     }
     vec![
         labelled("limit", &limit_text),
@@ -330,7 +330,7 @@ fn identified_line(matched: &MatchReport) -> String {
 
 fn residual_line(matched: &MatchReport) -> String {
     let text = format!(
-        "{:.3} px, {} root mean square",
+        "{:.3} px, {} rms",
         matched.rms_px,
         format::small(matched.rms_arcsec)
     );

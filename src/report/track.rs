@@ -187,23 +187,25 @@ impl TrackReport {
 
 fn not_tracked(loss: &Loss) -> NotTrackedReport {
     let text = match loss {
-        Loss::NoAttitude => "there is no attitude before this frame".to_owned(),
-        Loss::NoRate => "there is one attitude before this frame, and so no rate".to_owned(),
-        Loss::OtherSize => "the frame is not as large as the one before it".to_owned(),
-        Loss::NotLater => "the time of the frame is not after that of the one before it".to_owned(),
+        Loss::NoAttitude => "there is no earlier attitude".to_owned(),
+        Loss::NoRate => {
+            "there is only one earlier attitude, so the angular rate is unknown".to_owned()
+        }
+        Loss::OtherSize => "the size of the frame differs from that of the previous one".to_owned(),
+        Loss::NotLater => "the time of the frame is not after that of the previous one".to_owned(),
         Loss::TooUncertain { radius_px } => {
-            format!("the stars may be {radius_px:.0} px from their predicted places")
+            format!("the predicted positions of the stars are uncertain by {radius_px:.0} px")
         }
         Loss::TooFewStars { predicted } => {
-            format!("only {predicted} stars stand alone in the predicted field")
+            format!("only {predicted} isolated stars are in the predicted field")
         }
         Loss::NoAgreement {
             predicted,
             agreeing,
             log10_false_alarm,
         } => format!(
-            "{agreeing} of {predicted} stars are where they agree with one attitude; log10 of the \
-             probability of that by chance is {log10_false_alarm:.1}"
+            "{agreeing} of {predicted} predicted stars agree with one attitude, with a false-alarm \
+             probability of 10^{log10_false_alarm:.1}"
         ),
     };
     NotTrackedReport {

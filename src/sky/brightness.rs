@@ -56,10 +56,9 @@ impl NoBrightness {
     pub const fn text(self) -> &'static str {
         match self {
             Self::BiasUnknown => {
-                "the level of a pixel without light is not known; a dark frame or a description of the \
-                 camera tells it"
+                "the dark level is unknown; a dark frame or the camera's description gives it"
             }
-            Self::NotLinear => "gray levels are not proportional to light, as in most JPEG files",
+            Self::NotLinear => "the response is not linear, as in most JPEG files",
         }
     }
 }

@@ -43,7 +43,7 @@ impl fmt::Display for MissingStar {
             Some((distance_px, true)) => write!(f, "a detection {distance_px:.1} px off)"),
             Some((distance_px, false)) => write!(
                 f,
-                "a detection {distance_px:.1} px off that is not shaped like a star)"
+                "a detection {distance_px:.1} px off that does not look like a star)"
             ),
         }
     }

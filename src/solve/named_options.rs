@@ -97,7 +97,7 @@ impl SolveOptions {
             "sky" => put(&mut self.sky, switch(text)),
             "trails" => put(&mut self.trails, switch(text)),
             "time_limit" => number.put(&mut self.time_limit_s, ABOVE_0.., "s"),
-            _ => Err("is no option".to_owned()),
+            _ => Err("is not an option".to_owned()),
         }
     }
 }

@@ -198,32 +198,30 @@ impl Note {
     const fn fixed_text(&self) -> Option<&'static str> {
         Some(match self {
             Self::BrightnessUnknown => {
-                "the list has no flux and no magnitude; its rows were taken to be in order of brightness"
+                "the list has no flux and no magnitude; its rows are assumed to be sorted by brightness"
             }
             Self::NoDate => {
-                "the date is not known: star positions are those of 2000, without aberration, and the \
-                 stated error of the focal length includes that"
+                "the date is unknown: star positions are those of 2000, aberration is not corrected, and the \
+                 stated error of the focal length allows for it"
             }
             Self::NoTimeOfDay => {
-                "the time of day is not known, and so the site gives no zenith distance and no refraction"
+                "the time of day is unknown, so zenith distance and refraction are not computed"
             }
             Self::ZoneAssumed => {
-                "nothing says what the clock of the file's time was ahead of UTC: the time was taken for UTC, and \
-                 the place in the sky of the site is true only if it is (utc_offset)"
+                "the time zone of the file's time is unknown, and UTC was assumed: altitude and azimuth are \
+                 correct only if that is right (utc_offset)"
             }
             Self::AttitudeOnly => {
-                "attitude and optics are from the brightest stars; no other star was looked up, and no \
+                "attitude and optics are from the brightest stars; the other stars were not identified, and no \
                  magnitude was measured"
             }
             Self::PointingAtOnce => {
-                "the brightest stars told where the camera points; the others were not measured"
+                "the brightest stars were enough to find the pointing; the others were not measured"
             }
             Self::SkyNotMeasured => {
-                "the sky was not measured: too few stars are bright enough to tell how clear it is"
+                "the sky was not measured: too few stars are bright enough to measure its transparency"
             }
-            Self::NoExposure => {
-                "the exposure is not known, and so nothing is predicted of the camera"
-            }
+            Self::NoExposure => "the exposure is unknown, so nothing is predicted for the camera",
             _ => return None,
         })
     }
@@ -437,7 +435,7 @@ impl fmt::Display for Note {
             Self::LargestImage(choice) => choice.fmt(f),
             Self::Orientation(orientation) => write!(
                 f,
-                "the picture is {orientation} from the rows of the file (Orientation {}); x and y are those of the picture as drawn",
+                "the file's rows are displayed {orientation} (Orientation {}); x and y refer to the displayed picture",
                 orientation.tag()
             ),
             Self::Assumed(assumption) => assumption.fmt(f),
@@ -451,7 +449,7 @@ impl fmt::Display for Note {
             Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
-                "the site, the date and the attitude contradict each other: the frame's centre stands {:.1}° below the horizon",
+                "site, date and attitude contradict each other: the frame's center would be {:.1}° below the horizon",
                 depth_rad * DEG_PER_RAD
             ),
             Self::SiteOrTime(wrong) => wrong.fmt(f),
@@ -461,19 +459,20 @@ impl fmt::Display for Note {
             } => write_guessed_size(f, *size_px, *centre_sigma_px),
             Self::MoreStars { wanted } => write!(
                 f,
-                "the brightest {wanted} detections, as many as were to be measured, did not identify the \
-                 frame, and so all were measured"
+                "the brightest {wanted} detections did not identify the frame, so all were measured"
             ),
             Self::Camera(contradiction) => contradiction.fmt(f),
             Self::RoundPicture(circle) => write_circle(f, circle),
             Self::NotLinear { slope, mean_v_mag } => write!(
                 f,
-                "the grey levels are not proportional to light: a magnitude is {:.2} ± {:.2} in this frame, and its zero point holds near V {mean_v_mag:.1} only",
+                "the response is not linear: a difference of 1 mag in the catalog is {:.2} ± {:.2} mag in this frame, and \
+                 the zero point is accurate only near V {mean_v_mag:.1}",
                 slope.value, slope.sigma
             ),
             Self::Vignetting(loss) => write!(
                 f,
-                "stars at the edge of the field are {:.2} ± {:.2} mag dimmer than in the centre, for which the zero point holds",
+                "vignetting: stars at the edge of the field are {:.2} ± {:.2} mag dimmer than in the center; the zero \
+                 point is for the center",
                 loss.value, loss.sigma
             ),
             Self::FalseDetections(tail) => write_noise_tail(f, *tail),
@@ -487,12 +486,12 @@ impl fmt::Display for Note {
             Self::BodyInFrame(seen) => write_body(f, seen),
             Self::BrightStarsNotNamed(stars) => {
                 let list = listed(stars.iter().map(MissingStar::to_string));
-                write!(f, "bright stars without a sure name: {list}")
+                write!(f, "bright catalog stars that were not identified: {list}")
             }
             Self::BrightDetectionsNotNamed(places) => {
                 let place = |[x, y]: &[f64; 2]| format!("({x:.1}, {y:.1})");
                 let list = listed(places.iter().map(place));
-                write!(f, "bright detections without a sure name: at {list}")
+                write!(f, "bright detections that were not identified: at {list}")
             }
             Self::LargeResiduals {
                 rms_px,
@@ -509,16 +508,15 @@ fn write_guessed_size(
 ) -> fmt::Result {
     write!(
         f,
-        "the size of the frame is not stated, and was taken to be {width} × {height} pixels, as far as \
-         the centroids reach"
+        "the size of the frame is not stated; {width} × {height} pixels were assumed, the extent of the centroids"
     )?;
     let Some([x, y]) = centre_sigma_px else {
         return Ok(());
     };
     write!(
         f,
-        "; the true centre may be off by {x:.0} px along x and {y:.0} px along y, and the stated errors \
-         include that"
+        "; the standard error of the frame's center is {x:.0} px along x and {y:.0} px along y, and the stated errors \
+         include it"
     )
 }
 
@@ -526,34 +524,32 @@ fn write_header_scale(f: &mut fmt::Formatter<'_>, pixel_scale_rad: [f64; 2]) -> 
     let [low, high] = pixel_scale_rad.map(|rad| rad * ARCSEC_PER_RAD);
     write!(
         f,
-        "the header's focal length and pixel size are not this frame's: they mean {low:.1}″ to {high:.1}″ a pixel"
+        "the header's focal length and pixel size do not fit this frame: they give {low:.1}″ to {high:.1}″ per pixel"
     )
 }
 
 fn write_double(f: &mut fmt::Formatter<'_>, double: &DoubleImage) -> fmt::Result {
     write!(
         f,
-        "every star is there twice: {double}; fluxes, zero point and limit are those of one of the two \
-         images, and positions and attitude are off by up to that offset: the stated error of the attitude \
-         has half of it"
+        "every star appears twice: {double}; fluxes, zero point and limit are those of one of the two images; \
+         positions and attitude may be wrong by up to that offset, and the stated error of the attitude \
+         includes half of it"
     )
 }
 
 fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64) -> fmt::Result {
     write!(
         f,
-        "the stars lie {rms_px:.1} px (rms) from where they are expected, more than their centroid errors \
-         explain: the lens or the spots are not as assumed; the stated errors include \
-         {excess_sigma_px:.1} px a star on each axis"
+        "the residuals of {rms_px:.1} px rms are larger than the centroid errors: the lens or the spots differ from \
+         the model; the stated errors include {excess_sigma_px:.1} px per star on each axis for this"
     )
 }
 
 fn write_other_lens(f: &mut fmt::Formatter<'_>, known_px: f64, found_px: f64) -> fmt::Result {
     write!(
         f,
-        "the stars are not where the lens in the description of the camera sees them: another lens, \
-         another focus, or it has moved; its focal length is {known_px:.2} px, that of this frame \
-         {found_px:.2} px"
+        "the lens in the camera's description does not fit the stars: it was changed, refocused or moved; its \
+         focal length is {known_px:.2} px, that of this frame {found_px:.2} px"
     )
 }
 
@@ -561,8 +557,8 @@ fn write_circle(f: &mut fmt::Formatter<'_>, circle: &Circle) -> fmt::Result {
     let Circle { centre, radius_px } = circle;
     write!(
         f,
-        "the sky fills a circle of {radius_px:.0} px around ({:.0}, {:.0}): this looks like a fisheye lens, \
-         whose middle is identified first; stars are needed there",
+        "the sky fills a circle of {radius_px:.0} px around ({:.0}, {:.0}), as with a fisheye lens; identification \
+         needs stars near the middle of the circle",
         centre.x, centre.y
     )
 }
@@ -571,15 +567,15 @@ fn write_other_size(f: &mut fmt::Formatter<'_>, known: [f64; 2], found: [f64; 2]
     let [x, y] = [known[0] / found[0], known[1] / found[1]];
     write!(
         f,
-        "the lens in the description of the camera was measured in frames of {} x {} px, and is not used: this frame is {}",
+        "the lens in the camera's description is not used, because it was measured in frames of {} x {} px: this frame is {}",
         known[0],
         known[1],
         if x == y && x.fract() == 0.0 {
             format!("binned {x} x {x}")
         } else if found[0] == known[1] && found[1] == known[0] {
-            "turned by a quarter".to_owned()
+            "rotated by 90°".to_owned()
         } else {
-            "of another camera, or a part of one".to_owned()
+            "from another camera, or cropped".to_owned()
         }
     )
 }
@@ -588,7 +584,7 @@ fn write_columns(f: &mut fmt::Formatter<'_>, columns: &[usize]) -> fmt::Result {
     let list = listed(columns.iter().map(usize::to_string));
     write!(
         f,
-        "columns hold one value instead of light, all along or in part, and are left out there: x = {list}"
+        "these columns have a constant value, completely or in part, and are ignored there: x = {list}"
     )
 }
 
@@ -596,7 +592,7 @@ fn write_wings(f: &mut fmt::Formatter<'_>, wings: &Wings) -> fmt::Result {
     let (percent, sigma_percent) = (100.0 * wings.share, 100.0 * wings.sigma);
     write!(
         f,
-        "the stars have wings: {percent:.1} ± {sigma_percent:.1} % of the light of their fitted spots lies farther out, and is added to the fluxes"
+        "the stars have wings: light outside the fitted spots, {percent:.1} ± {sigma_percent:.1} % of that in them, is added to the fluxes"
     )
 }
 
@@ -610,14 +606,14 @@ fn write_lines(f: &mut fmt::Formatter<'_>, trails: &[Trail]) -> fmt::Result {
     };
     let list = listed(trails.iter().map(place));
     let count = counted(trails.len(), "trail");
-    write!(f, "{count} of satellites, aeroplanes or meteors: {list}")
+    write!(f, "{count} of satellites, aircraft or meteors: {list}")
 }
 
 fn write_trails(f: &mut fmt::Formatter<'_>, trails: &StarTrails) -> fmt::Result {
     write!(
         f,
-        "the stars are trails of {:.0} px at {:.0}°, in the image, from its x axis: each position is the \
-         middle of a trail, so attitude and optics are those of the middle of the exposure",
+        "the stars are trailed by {:.0} px at {:.0}° from the image's x axis: each position is the middle of a trail, \
+         so attitude and optics are those at mid-exposure",
         trails.length_px,
         trails.angle_rad * DEG_PER_RAD
     )
@@ -632,10 +628,10 @@ fn write_mosaic(f: &mut fmt::Formatter<'_>, mosaic: &RawColor) -> fmt::Result {
     match mosaic.green_over_mean {
         Some(ratio) => write!(
             f,
-            "fluxes and the zero point are those of the green pixels, {ratio:.2} times that mean"
+            "fluxes and the zero point refer to the green pixels, {ratio:.2} times that mean"
         ),
         None => f.write_str(
-            "fluxes and the zero point are those of that mean, a quarter red, half green, a quarter blue",
+            "fluxes and the zero point refer to that mean: a quarter red, half green, a quarter blue",
         ),
     }
 }
@@ -656,11 +652,11 @@ fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
         position.y
     )?;
     match (seen.source, seen.uncertainty_px < 1.0) {
-        (Some(_), _) => f.write_str(", and the detection there is not a star"),
-        (None, true) => f.write_str(", where no detection can be told to be it"),
+        (Some(_), _) => f.write_str(", and the detection there is this body, not a star"),
+        (None, true) => f.write_str(", but no detection there can be identified with it"),
         (None, false) => write!(
             f,
-            ", give or take {:.0} px for what is known of time and site; no detection can be told to be it",
+            " within {:.0} px, because time or site are uncertain; no detection can be identified with it",
             seen.uncertainty_px
         ),
     }
@@ -670,11 +666,11 @@ fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
     let [least_px, largest_px] = psf.sigma_range_px;
     write!(
         f,
-        "the spots are not round Gaussians of one size (standard deviation {least_px:.2} to {largest_px:.2} px, ratio of the axes up to {:.1}): the stars are fitted with the form that they have",
+        "the spots are not round Gaussians of one size (standard deviation {least_px:.2} to {largest_px:.2} px, axis ratio up to {:.1}): the stars are fitted with the point-spread function measured in the frame",
         psf.axis_ratio
     )?;
     if psf.is_comatic {
-        f.write_str("; they have coma, and the focal length and the lens model may be off by more than their stated errors")?;
+        f.write_str("; they have coma, so errors of the focal length and the lens model may be larger than stated")?;
     }
     Ok(())
 }
@@ -682,12 +678,12 @@ fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
 fn write_noise_tail(f: &mut fmt::Formatter<'_>, tail: NoiseTail) -> fmt::Result {
     let cause = match tail {
         NoiseTail::Correlated => "is correlated between pixels",
-        NoiseTail::Coarse => "is below the steps of the grey levels and has rare large values",
+        NoiseTail::Coarse => "is smaller than the steps of the gray levels, with rare large values",
         NoiseTail::CutOff => "is cut off at the frame's lowest value",
     };
     write!(
         f,
-        "the noise {cause}, and the rate of false detections may be some ten times that asked for"
+        "the noise {cause}: the rate of false detections may be ten times the stated one"
     )
 }
 

@@ -19,7 +19,7 @@ pub enum StoreError {
         differences: String,
     },
     /// The directory has results of an unknown run.
-    #[error("{} has {name} and no {file}, which would tell what run it is of", .directory.display())]
+    #[error("{} has {name} but no {file}: the run that it belongs to is unknown", .directory.display())]
     UnknownRun {
         /// The directory.
         directory: PathBuf,
@@ -29,13 +29,13 @@ pub enum StoreError {
         file: &'static str,
     },
     /// A file that says whose the directory is was changed since it was written.
-    #[error("{} is damaged; the command that wrote the directory writes it anew, if results show that they are its own", .0.display())]
+    #[error("{} is damaged; repeat the command that wrote the directory: it restores the file if the results are its own", .0.display())]
     Damaged(PathBuf),
     /// Another process writes the results.
     #[error("another run is writing {}", .0.display())]
     Locked(PathBuf),
     /// A table has other content than this run would write.
-    #[error("{}, line {line}: {problem}; the table was changed: remove the directory to begin anew", .path.display())]
+    #[error("{}, line {line}: {problem}; the table was changed: remove the directory to start again", .path.display())]
     Changed {
         /// The table.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum StoreError {
         problem: String,
     },
     /// There is no archive in the directory.
-    #[error("{} has no archive.json: no archive has begun in it", .0.display())]
+    #[error("{} has no archive.json: it is not an archive", .0.display())]
     NoArchive(PathBuf),
     /// Parts are missing or damaged.
     #[error("{missing} of {parts} parts are missing or damaged in {}: see `starpipe archive status`", .directory.display())]

@@ -184,8 +184,8 @@ impl<Row> Lines<'_, Row> {
     /// What is left out, in words.
     fn left_out(&self, path: &Path) -> Vec<String> {
         let parts = [
-            (&self.damaged, "damaged, whose frames are done again"),
-            (&self.surplus, "of other frames, or repeated, left out"),
+            (&self.damaged, "damaged; their frames are processed again"),
+            (&self.surplus, "of other frames, or repeated, ignored"),
         ];
         let parts = parts.into_iter().filter(|(lines, _)| !lines.is_empty());
         let text = |(lines, what): (&Vec<usize>, _)| {

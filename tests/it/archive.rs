@@ -66,7 +66,7 @@ fn tables_do_not_depend_on_workers_or_threads_and_a_rerun_skips_what_is_there() 
         "{}",
         again.stdout
     );
-    assert!(again.stdout.ends_with("; 2 parts there already\n"));
+    assert!(again.stdout.ends_with("; 2 parts already done\n"));
     assert!(files(&night.join("shards")) == expected);
 }
 
@@ -405,7 +405,7 @@ fn what_is_damaged_loses_only_itself() {
     let report = run(night, &["archive", "report", "out", "--format", "json"]);
     assert_eq!(report.status, 1);
     assert!(
-        report.stderr.contains("is damaged: it is left out"),
+        report.stderr.contains("is damaged: it is ignored"),
         "{}",
         report.stderr
     );
@@ -416,7 +416,8 @@ fn what_is_damaged_loses_only_itself() {
     );
     let ran = process(night, "out", &[]);
     assert!(
-        ran.stderr.contains("part 1 is damaged: it is done again"),
+        ran.stderr
+            .contains("part 1 is damaged and is processed again"),
         "{}",
         ran.stderr
     );
@@ -433,7 +434,7 @@ fn what_is_damaged_loses_only_itself() {
             told.stderr
         );
         let ran = process(night, "out", &[]);
-        let mended = format!("{name} was damaged: it is written anew");
+        let mended = format!("{name} was damaged and is rewritten");
         assert!(ran.stderr.contains(&mended), "{}", ran.stderr);
         assert!(files(&night.join("out")) == whole);
     }

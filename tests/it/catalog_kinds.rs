@@ -785,7 +785,7 @@ fn files_that_are_not_catalogues_are_refused_with_what_is_missing() {
             "id,ra,mag\n1,2,3\n",
             "no column of right ascensions and declinations",
         ),
-        ("x,y,flux\n1,2,3\n", "not a catalog that can be read"),
+        ("x,y,flux\n1,2,3\n", "unknown catalog format"),
         (
             "id,ra,dec,mag\n1,2,3,99\n",
             "expected a magnitude from -32 to 32",

@@ -228,7 +228,7 @@ fn frames_that_are_not_dark_are_refused() {
         &[&place("small"), &place("stars")],
         "expected frames of one size",
     );
-    refused(&[&place("none/*.tif")], "no frame has such a name");
+    refused(&[&place("none/*.tif")], "no file matches");
     refused(&[&place("none.tif")], "none.tif");
     let one = fs::read_dir(place("small"))
         .unwrap()
@@ -266,7 +266,7 @@ fn nonsensical_options_are_refused_before_any_work() {
         (&["--half-window-px", "0"], "0 is not in 1..=15"),
         (
             &["--vmag", "5"],
-            "--vmag goes with --normalisation energy only",
+            "--vmag applies to --normalisation energy only",
         ),
         (
             &["--normalisation", "energy"],
@@ -275,7 +275,7 @@ fn nonsensical_options_are_refused_before_any_work() {
         (&["--read-noise-e", "5"], "expected --camera or --preset"),
         (
             &["--centroid", "gaussian-fit"],
-            "goes with --normalisation energy only",
+            "applies to --normalisation energy only",
         ),
         (&["--figures", "png"], "--out"),
         (&["--focused-px", "-1"], "0 or above"),
@@ -289,12 +289,12 @@ fn nonsensical_options_are_refused_before_any_work() {
         (
             &["--peak", "0.5"][..],
             2,
-            "--peak goes with --normalisation peak only",
+            "--peak applies to --normalisation peak only",
         ),
         (
             &["--at-noise", "1e-3"],
             2,
-            "--at-noise goes with --normalisation peak only",
+            "--at-noise applies to --normalisation peak only",
         ),
         (
             &["--read-noise-e", "0", "--dark-current-e-s", "0"],
@@ -318,8 +318,7 @@ fn an_unreachable_error_is_answered_with_the_best_radius() {
     let ran = defocus(&[&SMALL_ENERGY[..], &["--required-error", "1e-6"]].concat());
     assert_eq!(ran.status, 3, "{}", ran.stderr);
     assert!(
-        ran.stdout
-            .contains("no radius: the best that can be had is 0.0"),
+        ran.stdout.contains("no radius: the smallest error is 0.0"),
         "{}",
         ran.stdout
     );

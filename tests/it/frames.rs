@@ -324,7 +324,7 @@ fn a_directory_of_photographs_that_are_not_read_says_so() {
     files.add("c.fits", &orion_fits(&[]));
     let ran = process([files.0.path().to_owned()]);
     assert_eq!(ran.status, 0);
-    let told = "passed over 1 file in a format that is not read: ";
+    let told = "skipped 1 file in an unsupported format: ";
     assert!(ran.stderr.contains(told), "{}", ran.stderr);
     assert_eq!(ran.reports().len(), 1);
 }
@@ -408,11 +408,11 @@ fn a_right_scale_in_the_header_helps_and_a_wrong_one_does_no_harm() {
     assert!(
         note(&reports[0])
             .unwrap()
-            .starts_with("the date is not known")
+            .starts_with("the date is unknown")
     );
     let wrong = note(&reports[1]).unwrap();
     assert!(
-        wrong.ends_with("they mean 45.5″ to 68.2″ a pixel"),
+        wrong.ends_with("they give 45.5″ to 68.2″ per pixel"),
         "{wrong}"
     );
     let absurd = note(&reports[2]).unwrap();
@@ -497,7 +497,7 @@ fn a_directory_stands_for_the_frames_in_it() {
     };
     let ran = process([files.0.path().to_owned()]);
     assert_eq!(ran.status, 0);
-    let passed_over = "starpipe: passed over 2 files that are no images: ";
+    let passed_over = "starpipe: skipped 2 files that are not images: ";
     assert!(ran.stderr.starts_with(passed_over), "{}", ran.stderr);
     assert_eq!(ran.stderr.lines().count(), 1);
     assert_eq!(named(&ran), expected);
@@ -519,7 +519,7 @@ fn a_directory_stands_for_the_frames_in_it() {
     assert_eq!(
         ran.stderr,
         format!(
-            "starpipe: reading {}: a directory without frames: found 1 file that is no image in it, \
+            "starpipe: reading {}: a directory without frames: found 1 file that is not an image in it, \
              expected FITS, TIFF, PNG, JPEG, BMP or PGM\n",
             empty.path().display()
         )

@@ -551,7 +551,11 @@ fn nonsensical_options_are_refused() {
             "900",
             "360 to 780 nm, which does not cover the band",
         ),
-        ("--band-to-nm", "300", "the band runs backwards"),
+        (
+            "--band-to-nm",
+            "300",
+            "band_from_nm must be below band_to_nm",
+        ),
         ("--band-to-nm", "1e300", "to below 10000"),
         ("--plot", "a.svg", "--sweep"),
     ] {

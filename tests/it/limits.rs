@@ -238,7 +238,7 @@ fn a_crowded_picture_takes_no_more_memory_than_it_may() {
     };
     let ran = with_memory("20");
     assert_eq!(ran.status, 1);
-    let expected = "pixels stand out from the background, for which there is not memory enough";
+    let expected = "pixels are above the detection threshold, which needs too much memory";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     let ran = with_memory("200");
     assert_eq!(ran.status, 3, "{}", ran.stderr);

@@ -207,7 +207,7 @@ fn a_night_tells_clouds_and_the_knock_and_goes_on_where_it_stopped() {
     let mended = night(&out, &[]);
     assert_eq!(mended.status, 0);
     for told in [
-        "night.jsonl: 1 line damaged, whose frames are done again: 6\n",
+        "night.jsonl: 1 line damaged; their frames are processed again: 6\n",
         "night-run.json was damaged",
     ] {
         assert!(mended.stderr.contains(told), "{}", mended.stderr);

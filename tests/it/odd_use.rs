@@ -41,7 +41,7 @@ fn a_directory_may_hold_its_own_results() {
     assert_eq!(again.status, 0);
     let mut told = again.stderr.lines();
     assert!(
-        told.all(|line| line.starts_with("starpipe: passed over 4 ")),
+        told.all(|line| line.starts_with("starpipe: skipped 4 ")),
         "{}",
         again.stderr
     );
@@ -124,7 +124,7 @@ fn an_import_overwrites_neither_input_nor_device() {
     assert!(
         device
             .stderr
-            .ends_with("link: it exists and is no regular file\n"),
+            .ends_with("link: it exists and is not a regular file\n"),
         "{}",
         device.stderr
     );

@@ -97,7 +97,7 @@ fn a_limit_has_its_budget_and_a_sweep_its_values() {
     assert_eq!(page.figures(), 2);
     let budget = page.table("Budget of the limit")["rows"].as_u64().unwrap() as usize;
     let noise =
-        (0..budget).find(|&row| page.cell("Budget of the limit", "quantity", row) == "all noise");
+        (0..budget).find(|&row| page.cell("Budget of the limit", "quantity", row) == "total noise");
     let noise = page.cell("Budget of the limit", "value", noise.unwrap());
     assert_eq!(noise.as_f64().unwrap(), number(prediction, "/noise_e"));
 
@@ -284,10 +284,10 @@ fn a_lens_has_its_errors_and_the_frames_that_are_left_out() {
         "to {:.3} px on each axis",
         number(report, "/held_out_rms_px")
     ));
-    page.has("<li>night&#x2f;other.tif is left out: ");
+    page.has("<li>night&#x2f;other.tif was not used: ");
     assert_eq!((page.figures(), page.pictures()), (1, 1));
     assert_eq!(
-        page.cell("Frames that are left out", "frame", 0),
+        page.cell("Frames that were not used", "frame", 0),
         "night/other.tif"
     );
     for (row, frame) in report["frames"].as_array().unwrap().iter().enumerate() {

@@ -59,7 +59,7 @@ fn a_frame_without_a_zero_point_says_why() {
         reason["text"]
             .as_str()
             .unwrap()
-            .contains("a zero point takes 5")
+            .contains("a zero point needs 5")
     );
 }
 
@@ -199,7 +199,7 @@ fn a_photograph_with_a_tone_curve_says_so() {
     let notes = report["notes"].as_array().unwrap();
     let reported = |note: &Value| {
         let text = note["text"].as_str().unwrap();
-        note["code"] == "not_linear" && text.contains("not proportional to light")
+        note["code"] == "not_linear" && text.contains("not linear")
     };
     assert!(notes.iter().any(reported), "{notes:?}");
 }

@@ -239,7 +239,7 @@ fn missing(
     let mut missing = Vec::new();
     let mut add = |what, reason: String| missing.push(MissingQuantity { what, reason });
     if groups.iter().all(|group| group.frames < 2) {
-        let reason = "no two frames of one exposure: noise and pattern cannot be separated";
+        let reason = "no two frames have the same exposure: noise and pattern cannot be separated";
         for what in [
             "temporal_noise",
             "read_noise",
@@ -249,7 +249,7 @@ fn missing(
             add(what, reason.to_owned());
         }
     } else if read_noise_adu.is_none() {
-        let reason = "the noise is less than half the step between grey levels";
+        let reason = "the noise is less than half the step between gray levels";
         for what in ["temporal_noise", "read_noise"] {
             add(what, reason.to_owned());
         }
@@ -269,14 +269,13 @@ fn missing(
         );
     }
     if full_scale.is_none() {
-        let reason =
-            "the file's levels have no full scale: the detector's bits or the camera give one";
+        let reason = "full scale is unknown: give the detector's bits or the camera";
         add("relative", reason.to_owned());
     }
     if config.gain_e_per_adu.is_none() {
         add(
             "electrons",
-            "the gain is not known: the camera's description gives it".to_owned(),
+            "the gain is unknown: give the camera's description".to_owned(),
         );
     }
     missing

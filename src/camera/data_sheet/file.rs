@@ -139,14 +139,14 @@ impl DataSheet {
         let (from, to) = (self.band_from_nm, self.band_to_nm);
         if from >= to {
             return Some(format!(
-                "the band runs backwards: band_from_nm is {from}, band_to_nm {to}"
+                "band_from_nm must be below band_to_nm: found {from} and {to}"
             ));
         }
         if let Some(uncovered) = self.uncovered(from, to) {
             return Some(format!("{uncovered} (band_from_nm, band_to_nm)"));
         }
         if self.imperfections.spot_form == SpotForm::File && self.spot_image.is_none() {
-            return Some("spot_form is \"file\", and there is no spot_file".to_owned());
+            return Some("spot_form is \"file\", but spot_file is missing".to_owned());
         }
         (self.bias_adu >= self.full_scale_adu()).then(|| {
             let (bias, bits) = (self.bias_adu, self.bits);
@@ -496,7 +496,7 @@ mod tests {
             (
                 "band_from_nm",
                 "band_from_nm = 2000",
-                "the band runs backwards",
+                "band_from_nm must be below band_to_nm",
             ),
             (
                 "bias_adu",

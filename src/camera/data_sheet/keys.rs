@@ -85,13 +85,13 @@ pub const KEYS: &[Key<DataSheet>] = &[
     key!(
         gain_e_per_adu,
         NumberRange::Positive,
-        "gain, in electrons per grey level"
+        "gain, in electrons per gray level"
     ),
-    key!(bits, NumberRange::Whole(1.0, 32.0), "bits of a grey level"),
+    key!(bits, NumberRange::Whole(1.0, 32.0), "bits of a gray level"),
     key!(
         bias_adu,
         NumberRange::NotNegative,
-        "bias: grey level without light"
+        "bias: gray level without light"
     ),
     Key {
         name: "spot_sigma_px",
@@ -127,7 +127,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(vignetting in imperfections, FRACTION, "share of the light lost in the corners"),
     key!(field_radius_deg in imperfections,
         NumberRange::FromTo(1.0, 110.0),
-        "angle from the axis up to which a lens that is no pinhole images the sky, in degrees"
+        "radius of the field of a lens other than a pinhole, as an angle from the axis, in degrees"
     ),
     key!(distortion_px in imperfections,
         DISPLACEMENT_PX,
@@ -137,19 +137,19 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     key!(distortion7_px in imperfections, DISPLACEMENT_PX, "the same of seventh order"),
     key!(decentring_x_px in imperfections,
         DISPLACEMENT_PX,
-        "decentred lens, along x: displacement at the distance of the corner, in pixels"
+        "decentered lens, along x: displacement at the distance of the corner, in pixels"
     ),
     key!(decentring_y_px in imperfections,
         DISPLACEMENT_PX,
-        "decentred lens, along y: displacement at the distance of the corner, in pixels"
+        "decentered lens, along y: displacement at the distance of the corner, in pixels"
     ),
     key!(axis_x_px in imperfections,
         AXIS_PX,
-        "where the axis of the lens meets the frame: right of its centre, in pixels"
+        "where the axis of the lens meets the frame: right of its center, in pixels"
     ),
     key!(axis_y_px in imperfections,
         AXIS_PX,
-        "where the axis of the lens meets the frame: below its centre, in pixels"
+        "where the axis of the lens meets the frame: below its center, in pixels"
     ),
     key!(stretch_px in imperfections,
         DISPLACEMENT_PX,
@@ -161,7 +161,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(spot_axis_ratio in imperfections,
         NumberRange::FromTo(1.0, 10.0),
-        "longer over shorter axis of a star's spot; their product stays that of a round one"
+        "ratio of the longer to the shorter axis of a star's spot, at constant area"
     ),
     key!(spot_angle_deg in imperfections,
         NumberRange::FromTo(-180.0, 180.0),
@@ -173,7 +173,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(astigmatism_px in imperfections,
         ABERRATION_PX,
-        "astigmatism: half length of the line that a star in the corner is drawn out to, in pixels"
+        "astigmatism: half length of the line image of a star in the corner, in pixels"
     ),
     key!(field_curvature_px in imperfections,
         ABERRATION_PX,
@@ -181,11 +181,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(moffat_beta in imperfections,
         NumberRange::FromTo(1.2, 100.0),
-        "exponent of a spot of Moffat's profile"
+        "exponent of a Moffat profile"
     ),
     key!(obstruction in imperfections,
         NumberRange::FromTo(0.0, 0.95),
-        "diameter of the central obstruction over that of the pupil, for spots of Airy's pattern"
+        "diameter of the central obstruction relative to the pupil, for Airy patterns"
     ),
     key!(spot_step_px in imperfections,
         NumberRange::FromTo(0.01, 5.0),
@@ -225,11 +225,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(offset_sigma_adu in imperfections,
         NumberRange::NotNegative,
-        "standard deviation of the pixels' bias, in grey levels"
+        "standard deviation of the pixels' bias, in gray levels"
     ),
     key!(column_sigma_adu in imperfections,
         NumberRange::NotNegative,
-        "standard deviation of the columns' bias, in grey levels"
+        "standard deviation of the columns' bias, in gray levels"
     ),
     key!(blooming in imperfections,
         FRACTION,
@@ -237,7 +237,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(depth_um in imperfections,
         NumberRange::FromTo(0.1, 1000.0),
-        "depth of the layer that collects charge, in µm (for cosmic rays)"
+        "depth of the charge-collecting layer, in µm (for cosmic rays)"
     ),
     key!(pattern_seed in imperfections,
         NumberRange::Whole(0.0, 9_007_199_254_740_991.0),

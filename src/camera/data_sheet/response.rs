@@ -197,7 +197,7 @@ fn parse_row(
             expected,
         })
     };
-    let nm = number(0, "a wavelength in nanometres, before a comma,", |nm| {
+    let nm = number(0, "a wavelength in nanometers, before a comma,", |nm| {
         nm > 0.0 && nm.is_finite()
     })?;
     let value = number(1, "a value from 0 to 1", |v| (0.0..=1.0).contains(&v))?;

@@ -41,7 +41,7 @@ fn imperfections(sheet: &DataSheet) -> String {
     let imperfections = &sheet.imperfections;
     let _ = writeln!(
         text,
-        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# the ideal lens that is nearest: {}\n# projection = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
+        "\n# form of a star's spot: {}\n# spot_form = {:?}\n\n# projection of the ideal lens: {}\n# projection = {:?}\n\n# whether the image is reversed left to right\n# mirrored = {}",
         forms.join(", "),
         imperfections.spot_form.name(),
         projections.join(", "),

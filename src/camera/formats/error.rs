@@ -12,8 +12,7 @@ pub const TOLERANCE_PX: f64 = 0.01;
 pub enum FormatError {
     /// The lens is fitted too badly.
     #[error(
-        "the best fit of the lens as {format} is off by up to {found_px:.3} px; expected at most \
-         {expected_px} px"
+        "{format} cannot represent the lens: errors of up to {found_px:.3} px; expected at most {expected_px} px"
     )]
     TooFarOff {
         /// What it was to become.

@@ -35,7 +35,7 @@ impl RowParser for Tycho2 {
 
     fn kind(&self) -> String {
         let part = match self {
-            Self::Main => "main catalogue",
+            Self::Main => "main catalog",
             Self::Supplement1 => "supplement 1",
             Self::Supplement2 => "supplement 2",
         };

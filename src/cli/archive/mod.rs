@@ -29,7 +29,7 @@ pub(crate) struct ArchiveArgs {
 
 #[derive(Debug, Subcommand)]
 enum ArchiveCommand {
-    /// Show what is done, failed and missing; the exit status is 3 if parts are missing or damaged
+    /// Show finished and missing parts and failed frames; the exit status is 3 if parts are missing or damaged
     #[command(after_help = "Example:\n  starpipe archive status results")]
     Status(StatusArgs),
     /// Merge the parts of each table into one file, sorted by frame name
@@ -117,7 +117,7 @@ fn status_text(status: &ArchiveStatus) -> String {
         let parts = ranges(&status.damaged_parts);
         let _ = writeln!(
             text,
-            "damaged    parts {parts}, which the same command of `process` does again"
+            "damaged    parts {parts}, which the same `process` command writes again"
         );
     }
     for unread in status.unread.iter().take(UNREAD_SHOWN) {
@@ -145,10 +145,7 @@ fn report(arguments: &ReportArgs) -> Result<CommandOutput, CommandError> {
     let page_path = arguments.html.checked_path(&[], default)?;
     let damaged: Vec<_> = archive.tables_of_frames(PartState::Damaged).collect();
     for path in &damaged {
-        report_warning(format_args!(
-            "{} is damaged: it is left out",
-            path.display()
-        ));
+        report_warning(format_args!("{} is damaged: it is ignored", path.display()));
     }
     let nights = summary(&archive)?;
     let page = page_path.map(|path| super::page::file(&path, &page::build(&archive, &nights)?));

@@ -118,7 +118,9 @@ fn facts(frames: &[FrameSummary], nights: &[CameraNight]) -> Vec<Fact> {
             facts.push(Fact::new(name, text));
         }
     };
-    add("Half of the stars are found at V", "", |f| f.limit50_vmag);
+    add("Half of the stars are detected at V", "", |f| {
+        f.limit50_vmag
+    });
     add("Predicted", "", |f| f.predicted_limit50_vmag);
     add("Measured minus predicted", " mag", |f| {
         f.limit_difference_mag
@@ -139,7 +141,7 @@ fn notes(
     let mut notes = Vec::new();
     if !status.is_complete() {
         notes.push(format!(
-            "{} of {} parts are missing: the same `starpipe process` continues.",
+            "{} of {} parts are missing: repeat the same `starpipe process` command to continue.",
             status.parts - status.parts_done,
             status.parts
         ));

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Files of other programs")]
 pub(super) struct ExportOptions {
-    /// Write the lens as OpenCV's camera matrix and distortion, of cv or cv::fisheye
+    /// Write the lens as camera matrix and distortion of OpenCV, for cv or cv::fisheye
     #[arg(long, value_name = "FILE.yaml")]
     opencv: Option<PathBuf>,
     /// Write the lens as ROS camera_info
@@ -40,7 +40,7 @@ impl ExportOptions {
         let pointing = || {
             let pointings = measured.frames.iter().map(|frame| frame.pointing);
             let known: Option<Pointing> = pointings.flatten().next();
-            known.ok_or_else(|| anyhow!("no frame has a site, and a date with its time"))
+            known.ok_or_else(|| anyhow!("no frame has both a site and a date with time"))
         };
         let mut files = Vec::new();
         let mut add = |path: &Option<PathBuf>, text: &dyn Fn() -> anyhow::Result<String>| {

@@ -104,7 +104,7 @@ fn residuals(measured: &LensCalibration) -> Panel {
         ..Dot::from((cell.centre_px[0], cell.centre_px[1]))
     });
     Panel {
-        title: format!("Mean residuals, from the dots; the longest {longest_px:.3} px"),
+        title: format!("Mean residuals as lines from the dots; the longest is {longest_px:.3} px"),
         x,
         y,
         layers: vec![

@@ -35,8 +35,8 @@ use std::path::PathBuf;
     starpipe calibrate night/ -o camera.toml --html\n  \
     starpipe calibrate night/ --opencv lens.yaml\n  \
     starpipe process --camera camera.toml night.fits\n\n\
-    Twenty frames or more, whose stars are spread over the whole frame, measure a lens well. `process`, `track` and\n\
-    `identify` hold the lens that is in the file given with --camera.")]
+    Use twenty frames or more, with stars all over the frame. `process`, `track` and `identify` use the lens\n\
+    in the file given with --camera.")]
 pub(crate) struct CalibrateArgs {
     #[command(flatten)]
     frames: FrameOptions,
@@ -46,13 +46,13 @@ pub(crate) struct CalibrateArgs {
     memory: MemoryOption,
     #[command(flatten)]
     hints: HintOptions,
-    /// File for the lens: the description given with --camera, if any, with a table [lens]
+    /// File for the lens: a copy of the description given with --camera, if any, with a table [lens]
     #[arg(short, long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Overwrite files
     #[arg(long)]
     force: bool,
-    /// Figure of the stars over the frame, and of their residuals
+    /// Write a figure of the stars in the frame and of their residuals
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser())]
     plot: Option<PlotFile>,
     #[command(flatten)]

@@ -25,7 +25,7 @@ pub(super) fn build(
     let mut tables = vec![table("Frames", &csv_table(report.frames.iter())?)?];
     if !report.left_out.is_empty() {
         let csv = csv_table(report.left_out.iter())?;
-        tables.insert(0, table("Frames that are left out", &csv)?);
+        tables.insert(0, table("Frames that were not used", &csv)?);
     }
     let left_out = report.left_out.iter();
     let left_out = left_out.map(|frame| (frame.frame.clone(), frame.text.clone()));
@@ -44,9 +44,9 @@ pub(super) fn build(
         text: report.to_text(),
         figures: vec![figure(
             &sheet(measured),
-            "Where in the frame the stars are, and their mean residuals there",
+            "Positions of the stars in the frame, and their mean residuals",
         )],
-        thumbnails_title: "Frames that are left out".to_owned(),
+        thumbnails_title: "Frames that were not used".to_owned(),
         thumbnails: thumbnails(left_out),
         tables,
         provenance: vec![options(), catalog],
@@ -56,7 +56,7 @@ pub(super) fn build(
 fn answer(report: &LensReport) -> String {
     let lens = &report.lens;
     format!(
-        "{} with {}, focal length {:.3} ± {:.3} px, from {} in {}. It predicts stars that are left out of the fit to {:.3} px on each axis.",
+        "{} with {}, focal length {:.3} ± {:.3} px, from {} in {}. Cross-validation: stars not used in the fit are predicted to {:.3} px on each axis.",
         lens.model,
         lens.distortion.unwrap_or("no distortion"),
         lens.focal_length_px,
@@ -73,21 +73,21 @@ fn notes(report: &LensReport, unread: usize) -> Vec<String> {
         notes.push(format!("{} could not be read.", counted(unread, "file")));
     }
     for frame in report.left_out.iter().take(SHOWN) {
-        notes.push(format!("{} is left out: {}", frame.frame, frame.text));
+        notes.push(format!("{} was not used: {}", frame.frame, frame.text));
     }
     if report.left_out.len() > SHOWN {
         let more = report.left_out.len() - SHOWN;
-        notes.push(format!("{more} more are left out: see the table."));
+        notes.push(format!("{more} more were not used: see the table."));
     }
     if report.frames.len() < ENOUGH_FRAMES {
         notes.push(format!(
-            "{} or more frames, whose stars are spread over the whole frame, measure a lens well.",
+            "Use {} or more frames, with stars all over the frame.",
             ENOUGH_FRAMES
         ));
     }
     if report.coverage < ENOUGH_COVERAGE {
         notes.push(format!(
-            "There are stars in {:.0} % of the frame only: elsewhere the lens is not known as well. Frames with stars there help.",
+            "Only {:.0} % of the frame has stars; elsewhere the lens is less well known. Frames with stars there help.",
             100.0 * report.coverage
         ));
     }

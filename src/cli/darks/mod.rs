@@ -41,10 +41,10 @@ pub(crate) struct DarksArgs {
     /// [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
     exposure: Vec<ExposureOf>,
-    /// Bits of a grey level [default: those of --camera, else of the file's format]
+    /// Bits of a gray level [default: those of --camera, else of the file's format]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=32))]
     bits: Option<u32>,
-    /// Description of the camera, see `starpipe camera new`: its gain converts grey levels to
+    /// Description of the camera, see `starpipe camera new`: its gain converts gray levels to
     /// electrons
     #[arg(long, value_name = "FILE.toml")]
     camera: Option<PathBuf>,

@@ -24,7 +24,7 @@ pub(super) fn build(darks: &Darks, unread: usize) -> anyhow::Result<PageContent>
     } else {
         vec![page::figure(
             &drawing,
-            "How many pixels have which mean level, and which noise from frame to frame",
+            "Histograms of the pixels' mean level, and of their noise from frame to frame",
         )]
     };
     let mut tables = vec![page::table("Frames", &csv_table(darks.frame_rows())?)?];

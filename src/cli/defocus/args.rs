@@ -18,12 +18,11 @@ use std::path::PathBuf;
     starpipe defocus --normalisation peak --count 1000 --out defocus\n\n\
     The radius is the standard deviation of the spot. The error is the root mean square distance \
     between centroid and truth. --normalisation peak repeats the experiment of Wang et al., Laser & \
-    Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With energy \
-    all spots have the light of the star. The two have different answers.\n\n\
+    Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With energy all spots have the total light of the star. The two have different answers.\n\n\
     Exit status: 0 done, 1 something could not be read or written, 2 the command line is wrong,\n\
     3 no radius meets a required error.")]
 pub(crate) struct DefocusArgs {
-    /// What all spots have in common [default: energy with a camera, else peak]
+    /// Quantity that is the same for all spots [default: energy with a camera, else peak]
     #[arg(long, value_enum)]
     pub(super) normalisation: Option<Normalisation>,
     #[command(flatten)]
@@ -59,10 +58,10 @@ pub(crate) struct DefocusArgs {
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Brightest pixel of a spot centred on it, as a part of full scale; peak only [default: 0.675]
+    /// Brightest pixel of a spot centered on it, as a part of full scale; peak only [default: 0.675]
     #[arg(long, value_name = "PART", value_parser = values::share, allow_hyphen_values = true)]
     pub(super) peak: Option<f64>,
-    /// Pixels from the centre of a fixed window to its edge
+    /// Pixels from the center of a fixed window to its edge
     #[arg(long, value_name = "PX", default_value_t = 7, value_parser = clap::value_parser!(u8).range(1..=15))]
     pub(super) half_window_px: u8,
     /// How to measure a star's position [default: fixed-window for peak, gaussian-fit for energy]
@@ -89,9 +88,9 @@ pub(crate) struct DefocusArgs {
 /// What all spots have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Normalisation {
-    /// The brightest pixel, as in the paper: a wider spot has more light
+    /// The brightest pixel, as in the paper: a wider spot then has more light
     Peak,
-    /// The light, as with a real star
+    /// The total light, as for a real star
     Energy,
 }
 
@@ -99,9 +98,9 @@ pub(super) enum Normalisation {
 pub(super) enum CentroidingArg {
     /// Fit of a Gaussian spot
     GaussianFit,
-    /// Centre of the light above a threshold
+    /// Center of the light above a threshold
     GreyWeighted,
-    /// Centre of the light in a fixed window, without a threshold, as in the paper
+    /// Center of the light in a fixed window, without a threshold, as in the paper
     FixedWindow,
 }
 

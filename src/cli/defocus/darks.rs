@@ -31,7 +31,7 @@ pub(super) fn dark_noise(
         && (exposure_s / wanted_s - 1.0).abs() > SAME_EXPOSURE
     {
         report_warning(format_args!(
-            "the dark frames were exposed for {exposure_s} s, the stars for {wanted_s} s: the dark current differs"
+            "the dark frames were exposed for {exposure_s} s, the star images for {wanted_s} s: the dark current differs"
         ));
     }
     Ok(noise)
@@ -94,11 +94,13 @@ fn named_frames(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
 /// The files that match a pattern, at least one.
 fn matching(pattern: &str) -> Result<Vec<PathBuf>, CommandError> {
     let found = glob::glob(pattern).map_err(|error| {
-        CommandError::Usage(format!("--darks '{pattern}' is no pattern: {error}"))
+        CommandError::Usage(format!(
+            "--darks '{pattern}' is not a valid pattern: {error}"
+        ))
     })?;
     let found: Vec<_> = found.collect::<Result<_, _>>()?;
     if found.is_empty() {
-        return Err(anyhow!("{pattern}: no frame has such a name").into());
+        return Err(anyhow!("{pattern}: no file matches").into());
     }
     Ok(found)
 }

@@ -243,7 +243,7 @@ fn sampled(report: &DefocusReport, study: &StarStudy) -> Panel {
         sampled.into_iter().chain(integrated)
     });
     Panel {
-        title: "closed form at four noises; grey: spots sampled, not integrated".to_owned(),
+        title: "closed form at four noises; gray: spots sampled, not integrated".to_owned(),
         x: radius_axis(report),
         y: Axis::log("error (px)", true),
         layers: layers.collect(),
@@ -321,7 +321,7 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
         Panel {
             title: title_of(
                 study,
-                &format!("over the radius; dots: own noise, grey: its {guide}"),
+                &format!("over the radius; dots: own noise, gray: its {guide}"),
             ),
             x: radius_axis(report),
             y: error(),
@@ -451,7 +451,7 @@ fn radii_for_errors(report: &DefocusReport, star: &DefocusStarReport, study: &St
 fn accuracy_and_reach(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLORS);
     Panel {
-        title: "Accuracy against reach; numbers: radius (px), grey: Cramér-Rao bound".to_owned(),
+        title: "Centroid error and limit; numbers: radius (px), gray: Cramér-Rao bound".to_owned(),
         x: Axis::new("half of the stars are found at V"),
         y: Axis::log("error of the centroid (px)", true),
         layers: stars

@@ -88,7 +88,7 @@ fn too_sharp(report: &DefocusReport) -> Vec<String> {
     let too_sharp = best.filter(|radius_px| *radius_px < least_px);
     let warning = |radius_px| {
         format!(
-            "the best radius, {radius_px:.2} px, is below that of diffraction, {least_px:.2} px"
+            "the best radius, {radius_px:.2} px, is smaller than the diffraction limit, {least_px:.2} px"
         )
     };
     too_sharp.map(warning).collect()

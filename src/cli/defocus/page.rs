@@ -42,7 +42,7 @@ pub(super) fn build(
     Ok(PageContent {
         title: "Radius of the spot for the best centroids".to_owned(),
         question: format!(
-            "At which radius of the spot is the error of a centroid least? {} radii from {} to {} px.",
+            "Which spot radius has the smallest centroid error? {} radii from {} to {} px.",
             report.radii,
             five_digits(report.radii_px[0]),
             five_digits(report.radii_px[1])
@@ -88,12 +88,10 @@ fn caption(name: &str) -> &'static str {
     match name {
         "errors" => "Error of the centroid over noise and radius, with lines of equal error",
         "sections" => "The same at a few noises and at a few radii",
-        "best-radius" => "The radius to choose, over the noise",
-        "accuracy-and-reach" => {
-            "What a radius costs: error of the centroid against limiting magnitude"
-        }
+        "best-radius" => "Best radius as a function of the noise",
+        "accuracy-and-reach" => "Trade-off: centroid error against limiting magnitude",
         "spots" => "Spots of the paper's figure 1",
         "surface" => "The surface through the errors (eq. 13), ours and the paper's",
-        _ => "The error if pixels are sampled at their centres",
+        _ => "The error if pixels are sampled at their centers",
     }
 }

@@ -136,7 +136,7 @@ pub(super) fn chosen_for_you(v_mag: f64) -> String {
 fn with_advice(error: NoiseError) -> Error {
     match error {
         NoiseError::NoRelativeNoise => {
-            anyhow!("{error}; --camera gives the bits of a grey level")
+            anyhow!("{error}; --camera gives the bits of a gray level")
         }
         NoiseError::Zero => anyhow!("{error}: --read-noise-e or --darks gives it"),
         other => other.into(),
@@ -152,11 +152,11 @@ fn check(
     let usage = |message: &str| Err(CommandError::Usage(message.to_owned()));
     if !has_camera && !arguments.scenario.parameters.is_empty() {
         return usage(
-            "numbers of a camera are given, and no camera: expected --camera or --preset",
+            "camera parameters are given without a camera: expected --camera or --preset",
         );
     }
     if !has_camera && normalisation == Normalisation::Energy {
-        return usage("--normalisation energy is of a camera: expected --camera or --preset");
+        return usage("--normalisation energy needs a camera: expected --camera or --preset");
     }
     let has_other_centroid = arguments
         .centroid
@@ -179,7 +179,7 @@ fn check(
         Normalisation::Peak => (of_energy, "energy"),
     };
     match refused.iter().find(|(is_given, _)| *is_given) {
-        Some((_, option)) => usage(&format!("{option} goes with --normalisation {other} only")),
+        Some((_, option)) => usage(&format!("{option} applies to --normalisation {other} only")),
         None => Ok(()),
     }
 }

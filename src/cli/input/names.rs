@@ -74,7 +74,7 @@ pub(crate) fn report_passed_over(files: &[PassedOver]) {
         let others = if paths.len() > 1 { " and others" } else { "" };
         let count = counted_as(paths.len(), kind.text());
         report(format_args!(
-            "passed over {count}: {}{others}",
+            "skipped {count}: {}{others}",
             paths[0].display()
         ));
     }

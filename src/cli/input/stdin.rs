@@ -12,7 +12,7 @@ pub(crate) fn is_stdin(input: &Path) -> bool {
 pub(crate) fn check_once(inputs: &[PathBuf]) -> Result<(), CommandError> {
     if inputs.iter().filter(|input| is_stdin(input)).count() > 1 {
         return Err(CommandError::usage(
-            "- stands for standard input, which can be read only once; it is given twice",
+            "- is standard input, which can be read only once; it is given twice",
         ));
     }
     Ok(())

@@ -69,7 +69,7 @@ pub(super) fn build(
             continue;
         };
         let caption = format!(
-            "The limit over {}; the dot is the camera as it is",
+            "The limit over {}; the dot is the camera as described",
             sweep.parameter.title()
         );
         page.figures.push(figure(&sheet, &caption));
@@ -105,7 +105,7 @@ fn answer(row: &PredictionRow) -> String {
         Some(found) => {
             format!("{limit} starpipe's filter finds half of the stars of V {found:.2}.")
         }
-        None => limit + " starpipe's filter has no limit: it finds noise as often.",
+        None => limit + " starpipe's detector has no limit: noise is detected as often as stars.",
     }
 }
 

@@ -17,30 +17,31 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     starpipe night --site 52.22,4.42 --dark master-dark.fits --out 2026-01-15 night/\n  \
     starpipe night --site 47.1,8.3,900 --camera camera.toml --utc-offset 1 --out results 'night/image-*.tif'\n\n\
-    The frames are taken in the order of their dates. Some that are spread over the night tell the lens and how\n\
-    the camera stands; both are then held. --out has a line for each frame in night.jsonl, the same as\n\
-    night.csv, night.parquet and night.dat (the zenith in the skyglow community's format), and the night in\n\
-    night.json and night.svg; hot-pixels.csv lists what stays as the sky moves. The same command goes on where it was stopped.\n\n\
+    Frames are processed in the order of their dates. The lens and the orientation of the camera are measured\n\
+    in frames spread over the night, and then assumed to be constant. --out gets a line for each frame in\n\
+    night.jsonl, night.csv, night.parquet and night.dat (the zenith in the skyglow community's format), a\n\
+    summary in night.json, a figure in night.svg, and pixels that do not move with the sky in hot-pixels.csv.\n\
+    The same command continues a run that was stopped.\n\n\
     Exit status: 0 all went well, 1 something could not be read or written, 2 the command line is wrong, 3 no\n\
     frame was identified.")]
 pub(crate) struct NightArgs {
-    /// Frames of a night; a directory stands for the frames in it, a pattern ('night/*.fits') for those
-    /// that match, a list (.txt, .lst, .parquet, or - for standard input) for those that it names
+    /// Frames of a night; files, directories of frames, patterns ('night/*.fits'), or lists of names (.txt,
+    /// .lst, .parquet, or - for standard input)
     #[arg(value_name = "FRAME", required = true)]
     pub(super) frames: Vec<PathBuf>,
     /// Directory for the results
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Also write night.html: the figure, what changed, and the table, to look at in a browser
+    /// Also write night.html, a page with the figure, the events and the table
     #[arg(long)]
     pub(super) html: bool,
     /// What to print when the night is done [default: text]
     #[arg(long, value_enum)]
     pub(super) format: Option<PageFormat>,
-    /// Print errors only: no progress, no warnings, and no report but one that --format asks for
+    /// Print errors only: no progress, no warnings, and no report unless --format is given
     #[arg(short, long)]
     pub(super) quiet: bool,
-    /// Leave out the hot pixels that the sky's motion tells, which hot-pixels.csv lists
+    /// Ignore the hot pixels found in the frames of the night, which hot-pixels.csv lists
     #[arg(long, conflicts_with = "hot_pixels")]
     pub(super) mask_hot_pixels: bool,
     #[command(flatten)]
@@ -66,7 +67,7 @@ pub(super) struct StationOptions {
     /// Name of the instrument
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub(super) instrument: String,
-    /// Who supplies the data
+    /// Supplier of the data
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub(super) supplier: String,
     /// Name of the place
@@ -90,8 +91,8 @@ impl NightArgs {
         let mut options = with_stated(options, &self.limit)?;
         if options.date.is_some() {
             return Err(CommandError::usage(
-                "--date is one date for all frames; those of a night have their own, in their headers or in \
-                 their names with --utc-offset",
+                "--date sets one date for all frames, but each frame of a night needs its own: in its header, or in \
+                 its name with --utc-offset",
             ));
         }
         let camera = self.hints.description()?;

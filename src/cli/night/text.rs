@@ -18,13 +18,13 @@ pub(super) fn text(night: &NightSummary) -> String {
     );
     if !night.passed_over.is_empty() {
         let counts: Vec<String> = night.passed_over.iter().map(passed_over).collect();
-        let _ = writeln!(text, "other      {}: passed over", counts.join(", "));
+        let _ = writeln!(text, "skipped    {}", counts.join(", "));
     }
     let _ = writeln!(text, "hours      {}", hours(night));
     if let Some(hour) = &night.darkest_hour {
         let _ = writeln!(
             text,
-            "darkest    zenith V {:.2} mag/arcsec² from {} to {}",
+            "darkest    median of the zenith V {:.2} mag/arcsec² from {} to {}",
             hour.zenith_mag_arcsec2, hour.from, hour.to
         );
     }
@@ -76,7 +76,7 @@ fn hours(night: &NightSummary) -> String {
     }
     if night.timed < night.frames {
         text += &format!(
-            "; by {} of {} frames, which have a time",
+            "; from the {} of {} frames that have a time",
             night.timed, night.frames
         );
     }
@@ -86,15 +86,15 @@ fn hours(night: &NightSummary) -> String {
 /// Why no hours are known.
 fn unknown_hours(night: &NightSummary) -> &'static str {
     match night.timed {
-        0 => "not known, as no frame has a time",
-        1 => "not known, as one frame alone has a time",
-        _ => "not known, as all frames have the same time",
+        0 => "not known, because no frame has a time",
+        1 => "not known, because only one frame has a time",
+        _ => "not known, because all frames have the same time",
     }
 }
 
 fn clear_frames(night: &NightSummary) -> String {
     match night.judged {
-        0 => "no frame tells of clouds".to_owned(),
+        0 => "cloud cover not known".to_owned(),
         judged => format!("{} of {} clear", night.clear, counted(judged, "frame")),
     }
 }
@@ -111,7 +111,7 @@ pub(super) fn answer(night: &NightSummary) -> String {
                 unknown_hours(night)
             )
         }
-        _ => "No frame tells of clouds.".to_owned(),
+        _ => "The cloud cover is not known.".to_owned(),
     }
 }
 

@@ -17,13 +17,13 @@ pub(crate) struct CalibrationOptions {
     /// Dark frame or master dark to subtract; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     pub(crate) dark: Option<PathBuf>,
-    /// Master flat: the signal above the dark level is divided by it; see `starpipe flats`
+    /// Master flat by which the signal above the dark level is divided; see `starpipe flats`
     #[arg(long, value_name = "FILE")]
     pub(crate) flat: Option<PathBuf>,
     /// Pixels to ignore: a table with the columns x,y; see `starpipe darks`
     #[arg(long, value_name = "FILE.csv")]
     pub(crate) hot_pixels: Option<PathBuf>,
-    /// Image of the frame's size that is black where the frame does not show the sky: trees, houses,
+    /// Mask, an image of the frame's size that is black where something hides the sky: trees, houses,
     /// lamps
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: Option<PathBuf>,

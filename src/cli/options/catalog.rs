@@ -14,12 +14,12 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Resources")]
 pub(crate) struct CatalogOptions {
-    /// Star catalogue to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its
+    /// Star catalog to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its
     /// files), a table (CSV, TSV, from VizieR), or a file written by `starpipe catalog import`,
     /// which loads fastest
     #[arg(long, value_name = "PATH")]
     catalog: Option<PathBuf>,
-    /// Directory in which the index of the catalogue is kept [default: $STARPIPE_CACHE_DIR, else
+    /// Directory in which the index of the catalog is kept [default: $STARPIPE_CACHE_DIR, else
     /// the user's cache directory]
     #[arg(long, value_name = "DIR")]
     cache_dir: Option<PathBuf>,
@@ -76,7 +76,7 @@ impl CatalogOptions {
     /// The catalogue with its index, from the cache if possible.
     fn index<'a>(&self, catalog: &'a Catalog, tells: bool) -> IndexedCatalog<'a> {
         let progress = match tells {
-            true => bar(100, "indexing the catalogue {wide_bar} {percent} %"),
+            true => bar(100, "indexing the catalog {wide_bar} {percent} %"),
             false => ProgressBar::hidden(),
         };
         let show = |part: f64| progress.set_position((part * 100.0) as u64);

@@ -8,14 +8,14 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct FrameOptions {
-    /// Frames to read; a directory stands for the frames in it, - for standard input
+    /// Frames to read; a directory means all frames in it, - standard input
     #[arg(value_name = "FRAME", required = true)]
     pub(crate) frames: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct PageOption {
-    /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
+    /// Number of the image in a file with several, from 1: a page of a TIFF, an image or plane of a FITS
     /// file [default: the largest]
     #[arg(long, value_name = "NUMBER")]
     pub(crate) page: Option<NonZeroUsize>,

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 #[derive(Debug, Args, Serialize)]
-#[command(next_help_heading = "What is known of the frames")]
+#[command(next_help_heading = "Hints")]
 pub(crate) struct HintOptions {
     /// Horizontal field of view in degrees
     #[arg(
@@ -26,13 +26,13 @@ pub(crate) struct HintOptions {
         conflicts_with = "pixel_scale"
     )]
     fov: Option<String>,
-    /// Angle of a pixel in arcseconds
+    /// Pixel scale in arcseconds per pixel
     #[arg(long, value_name = "ARCSEC", allow_hyphen_values = true)]
     pixel_scale: Option<String>,
     /// Tolerance of --fov or --pixel-scale, in percent [default: 10]
     #[arg(long, value_name = "PERCENT", allow_hyphen_values = true)]
     scale_error: Option<String>,
-    /// Approximate direction of the frame's centre, in degrees or as 05h35m17s,-05d23m28s
+    /// Approximate direction of the frame's center, in degrees or as 05h35m17s,-05d23m28s
     #[arg(long, value_name = "RA,DEC", allow_hyphen_values = true)]
     near: Option<String>,
     /// Maximum distance of the frame's center from --near, in degrees [default: 10]
@@ -43,29 +43,29 @@ pub(crate) struct HintOptions {
         requires = "near"
     )]
     radius: Option<String>,
-    /// When the frames were taken, as ISO 8601, in UTC unless it has an offset; used for proper motion
-    /// and aberration [default: of frames, the date in the file's header, else in its name; else 2000]
+    /// Date and time of the frames, as ISO 8601, in UTC unless it has an offset; used for proper motion
+    /// and aberration [default: the date in the file's header, else in its name, else 2000]
     #[arg(long, value_name = "ISO8601", allow_hyphen_values = true)]
     date: Option<String>,
-    /// How many hours local times are ahead of UTC: those in names of files and in Exif, unless they say;
-    /// auto finds it by the stars over --site. Dates in FITS headers are UTC [default: not known, and such
-    /// a time tells no refraction]
+    /// Offset of local time from UTC in hours, positive if ahead; applies to times in file names and in
+    /// Exif that state no offset. auto determines it from the stars and --site. Dates in FITS headers
+    /// are UTC [default: unknown; UTC is assumed, and refraction is not corrected]
     #[arg(long, value_name = "HOURS|auto", allow_hyphen_values = true)]
     utc_offset: Option<String>,
     #[command(flatten)]
     #[serde(flatten)]
     observer: ObserverOptions,
-    /// Which directions the attitude refers to
+    /// Directions that the attitude refers to
     #[arg(long, value_name = "DIRECTIONS", value_enum, default_value_t)]
     frame_of: AttitudeFrame,
-    /// Description of the camera, see `starpipe camera new`: gives the scale if no option does, and
-    /// a predicted limiting magnitude for frames whose exposure is known. Its lens, where
-    /// `starpipe calibrate` has measured one, is held. Also a lens of OpenCV or ROS (.yaml), or a platepar
+    /// Description of the camera, see `starpipe camera new`. It gives the scale if no option does, and
+    /// a predicted limiting magnitude if the exposure is known. If it has a lens measured by
+    /// `starpipe calibrate`, that lens is used. Also reads a lens of OpenCV or ROS (.yaml), or a platepar
     /// of RMS (.cal)
     #[arg(long, value_name = "FILE")]
     #[serde(skip)]
     pub(crate) camera: Option<PathBuf>,
-    /// Fit the lens to each frame, although --camera has one that `starpipe calibrate` measured
+    /// Fit the lens to each frame, even if --camera has a measured one
     #[arg(long, requires = "camera")]
     refine_lens: bool,
 }
@@ -79,7 +79,7 @@ impl HintOptions {
     pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
         if self.scale_error.is_some() && self.fov.is_none() && self.pixel_scale.is_none() {
             return Err(CommandError::usage(
-                "--scale-error is the error of --fov or --pixel-scale; give one of these, too",
+                "--scale-error needs --fov or --pixel-scale",
             ));
         }
         with_stated(SolveOptions::default(), self)

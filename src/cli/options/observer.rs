@@ -5,8 +5,8 @@ use serde::Serialize;
 
 #[derive(Debug, Args, Serialize)]
 pub(crate) struct ObserverOptions {
-    /// Where the frames were taken: latitude and longitude (north and east positive) in degrees, and
-    /// height in metres; with date and time, gives zenith distance, airmass and refraction
+    /// Site: latitude and longitude (north and east positive) in degrees, and
+    /// height in meters; with date and time, gives zenith distance, airmass and refraction
     #[arg(long, value_name = "LAT,LON[,HEIGHT_M]", allow_hyphen_values = true)]
     site: Option<String>,
     /// Pressure and temperature of the air at --site, in hPa and °C [default: those of the standard
@@ -18,7 +18,7 @@ pub(crate) struct ObserverOptions {
         requires = "site"
     )]
     air: Option<String>,
-    /// Velocity of a spacecraft relative to the Earth's centre, in km/s along the axes of ICRS; with the
+    /// Velocity of a spacecraft relative to the Earth's center, in km/s along the axes of ICRS; with the
     /// date, for aberration
     #[arg(
         long,

@@ -99,7 +99,7 @@ impl clap::Args for SceneOptions {
         let projection = Arg::new(PROJECTION)
             .long(PROJECTION)
             .value_name(projections.clone())
-            .help("The ideal lens that is nearest to the camera's [default: the camera's]")
+            .help("Projection of the ideal lens closest to the camera's [default: the camera's]")
             .help_heading(CAMERA_HEADING)
             .value_parser(move |text: &str| {
                 Projection::named(text).ok_or_else(|| format!("expected {projections}"))

@@ -17,7 +17,7 @@ pub(crate) fn with_stated(
 }
 
 #[derive(Debug, Args, Serialize)]
-#[command(next_help_heading = "What is known of the frames")]
+#[command(next_help_heading = "Hints")]
 pub(crate) struct ExposureOption {
     /// Exposure of the frames, in seconds [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]

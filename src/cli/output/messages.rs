@@ -22,7 +22,7 @@ pub(crate) fn report_warning(message: impl Display) {
 pub(crate) fn report_mended(files: &[PathBuf]) {
     for path in files {
         report_warning(format_args!(
-            "{} was damaged: it is written anew",
+            "{} was damaged and is rewritten",
             path.display()
         ));
     }

@@ -25,17 +25,17 @@ use std::path::PathBuf;
     starpipe process --dark master-dark.fits --flat master-flat.fits --hot-pixels hot-pixels.csv night.fits\n  \
     ssh telescope cat night.fits.fz | starpipe process -\n  \
     starpipe process 'nights/*/*.fits' --out-parquet results --shard 3/100\n\n\
-    The format of a file is recognized from its content; any may be compressed with gzip or bzip2. Date,\n\
+    The format of a file is recognized from its content. Files may be compressed with gzip or bzip2. Date,\n\
     exposure, pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
     --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
-    overwrites only such results. In directories of frames such results are skipped.")]
+    overwrites only its own results. In directories of frames, results are skipped.")]
 pub(crate) struct ProcessArgs {
     /// Whether the sky is measured: `starpipe sky`.
     #[arg(skip)]
     pub(crate) sky: bool,
     #[command(flatten)]
     pub(super) frames: FrameOptions,
-    /// Which image of a file with several, from 1: a page of a TIFF, an image or plane of a FITS
+    /// Number of the image in a file with several, from 1: a page of a TIFF, an image or plane of a FITS
     /// file; or all of them, as FRAME[1], FRAME[2] and so on [default: the largest]
     #[arg(long, value_name = "NUMBER|all")]
     pub(super) page: Option<PageChoice>,
@@ -56,7 +56,7 @@ pub(crate) struct ProcessArgs {
 #[derive(Debug, Args, Serialize)]
 #[command(next_help_heading = "Detection")]
 struct DetectionOptions {
-    /// Detection threshold in standard deviations of the background, in place of --false-alarms
+    /// Detection threshold in standard deviations of the background, instead of --false-alarms
     #[arg(
         long,
         value_name = "NUMBER",
@@ -64,14 +64,14 @@ struct DetectionOptions {
         conflicts_with = "false_alarms"
     )]
     sigma: Option<String>,
-    /// Accepted false detections in a million pixels of noise [default: 0.1]
+    /// Accepted rate of false detections per million pixels of noise [default: 0.1]
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     false_alarms: Option<String>,
-    /// Maximum number of stars to measure, the brightest; a star tracker needs about 20. The
-    /// limiting magnitude is then not measured
+    /// Measure only this many of the brightest stars; a star tracker needs about 20. The limiting
+    /// magnitude is then not measured
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     max_stars: Option<String>,
-    /// Search satellites, aeroplanes and meteors, too: straight lines of light
+    /// Also search for trails of satellites, aircraft and meteors
     #[arg(long)]
     trails: bool,
     /// How to measure the position of a star
@@ -81,12 +81,12 @@ struct DetectionOptions {
 
 /// Hints that apply to frames, but not to lists of centroids.
 #[derive(Debug, Args, Serialize)]
-#[command(next_help_heading = "What is known of the frames")]
+#[command(next_help_heading = "Hints")]
 struct ConditionOptions {
     #[command(flatten)]
     #[serde(flatten)]
     exposure: ExposureOption,
-    /// With --camera, zenith distance of the frames' centres in degrees [default: from --site and
+    /// With --camera, zenith distance of the frames' centers in degrees [default: from --site and
     /// the date, else from the header, else 0]
     #[arg(
         long,
@@ -109,12 +109,12 @@ struct ConditionOptions {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Archives")]
 pub(super) struct PartOptions {
-    /// Write tables of frames and stars into this directory, part by part, and print no reports.
-    /// Parts that are there are skipped. FRAME may then also be a pattern ('night/*.fits'), or a list
-    /// of names: .txt (one a line), .parquet, or - for standard input
+    /// Write Parquet tables of frames and stars into this directory, in parts, and print no reports.
+    /// Existing parts are skipped. FRAME may then also be a pattern ('night/*.fits'), or a list
+    /// of names: .txt (one per line), .parquet, or - for standard input
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
     pub(super) out_parquet: Option<PathBuf>,
-    /// Process only the parts of worker K of N: every Nth
+    /// Process only the parts of worker K of N, that is every Nth part
     #[arg(long, value_name = "K/N", requires = "out_parquet")]
     pub(super) shard: Option<Shard>,
     /// Frames in each part

@@ -101,7 +101,7 @@ impl Worker<'_> {
                 PartState::Missing => {}
                 PartState::Damaged => {
                     let number = part.number;
-                    let text = format!("part {number} is damaged: it is done again");
+                    let text = format!("part {number} is damaged and is processed again");
                     progress.suspend(|| report_warning(text));
                 }
                 PartState::Whole => {
@@ -168,7 +168,7 @@ impl Counts {
             counted(identified + not_identified + failed, "frame"),
         );
         if self.skipped > 0 {
-            text += &format!("; {} there already", counted(self.skipped, "part"));
+            text += &format!("; {} already done", counted(self.skipped, "part"));
         }
         CommandOutput {
             text: text + "\n",

@@ -22,20 +22,20 @@ use std::path::PathBuf;
     same options and seed.")]
 #[command(group = ArgGroup::new("subject").args(["ra", "random_attitude", "stars", "dark", "flat"]).required(true))]
 pub(crate) struct SimulateArgs {
-    /// Right ascension of the frame's centre, in degrees
+    /// Right ascension of the frame's center, in degrees
     #[arg(long, value_name = "DEG", value_parser = values::right_ascension, allow_hyphen_values = true, requires = "dec")]
     pub(super) ra: Option<f64>,
-    /// Declination of the frame's centre, in degrees
+    /// Declination of the frame's center, in degrees
     #[arg(long, value_name = "DEG", value_parser = values::declination, allow_hyphen_values = true, requires = "ra")]
     pub(super) dec: Option<f64>,
-    /// Position angle of the image's up direction at its centre, from north through east, in
+    /// Position angle of the image's up direction at its center, from north through east, in
     /// degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = values::finite, allow_hyphen_values = true, requires = "ra")]
     pub(super) roll: f64,
     /// A random pointing for each frame, uniform over all rotations
     #[arg(long)]
     pub(super) random_attitude: bool,
-    /// Simulate these stars in place of the catalogue's: a table with the columns x,y,vmag
+    /// Simulate these stars in place of the catalog's: a table with the columns x,y,vmag
     #[arg(long, value_name = "LIST.csv")]
     pub(super) stars: Option<PathBuf>,
     /// Simulate dark frames: the shutter is closed

@@ -45,7 +45,7 @@ impl Description<'_> {
         header.real("RDNOISE", sheet.read_noise_e, "[electron]");
         let saturation_adu = self.simulated.frame.saturation_adu.map_or(0.0, f64::from);
         header.real("SATURATE", saturation_adu, "[adu]");
-        header.integer("BITS", i64::from(sheet.bits), "of a grey level");
+        header.integer("BITS", i64::from(sheet.bits), "of a gray level");
         if let Some(pointing) = &self.simulated.pointing {
             let view = SkyView {
                 camera: self.generator.simulator.camera(),

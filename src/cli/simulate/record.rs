@@ -83,7 +83,7 @@ impl SimulationRecord {
         }
         if let Some(stars) = self.stars_above_limit {
             text += &format!(
-                ", {stars} stars with the light of V {:.2} or more",
+                ", {stars} stars of V {:.2} or brighter",
                 self.predicted_limit_vmag
             );
         }

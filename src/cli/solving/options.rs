@@ -29,15 +29,15 @@ pub(crate) struct SolvingOptions {
 #[derive(Debug, Args, Serialize)]
 #[command(next_help_heading = "Identification")]
 struct IdentificationOptions {
-    /// Give a star a name only where the odds are at least this many to 1 that it is right
+    /// Minimum odds that a name is right, to 1; stars with lower odds get no name
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true,
           default_value_t = NAME_ODDS.to_string())]
     name_odds: String,
-    /// How much is tried where the brightest stars do not identify a frame at once
+    /// Effort of the search if the brightest stars do not identify a frame
     #[arg(long, value_enum, default_value_t)]
     effort: Effort,
-    /// Determine only this. pointing: attitude and optics, from the brightest stars, several times faster; no
-    /// further names, no zero point and no limiting magnitude
+    /// Measure only the pointing: attitude and optics, from the brightest stars. This is several times
+    /// faster, but gives no further names, no zero point and no limiting magnitude
     #[arg(long, value_enum, value_name = "WHAT")]
     only: Option<Only>,
     /// The same as --only pointing.
@@ -61,7 +61,7 @@ pub(super) enum ReportFormat {
     Text,
     /// A line for each frame, and a summary
     Table,
-    /// One JSON object a line
+    /// One JSON object per line
     Json,
     /// A table of the stars
     Csv,
@@ -75,18 +75,18 @@ pub(crate) struct OutputOptions {
     /// What to print [default: text; table for several inputs on a terminal]
     #[arg(long, value_enum)]
     pub(super) format: Option<ReportFormat>,
-    /// With --format text, list every identified star and not just the brightest
+    /// With --format text, list every identified star, not only the brightest
     #[arg(short = 'v', long, visible_alias = "verbose")]
     pub(super) all_stars: bool,
-    /// Print errors only: no progress, no warnings, and no reports but those that --format asks for
+    /// Print errors only: no progress, no warnings, and no reports unless --format is given
     #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Also write into this directory FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header,
-    /// if the frame is identified) and, for frames, FRAME.png (a picture with the stars marked and named)
+    /// Directory for result files: FRAME.json, FRAME.csv (its stars), FRAME.wcs (a FITS header, if the
+    /// frame is identified) and, for frames, FRAME.png (a picture with the stars marked and named)
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// With --out, also write FRAME.html: a page with the answer, the picture, figures and a table, to look at
-    /// in a browser
+    /// With --out, also write FRAME.html: a page for a browser with the result, the picture, figures and a
+    /// table
     #[arg(long, requires = "out")]
     pub(super) html: bool,
     /// With --out, also write FRAME.solved.fits: a copy of an identified frame with its coordinates (WCS) in the
@@ -96,7 +96,7 @@ pub(crate) struct OutputOptions {
     /// With --out, also write FRAME.reg: the detections as regions for SAOImage DS9
     #[arg(long, requires = "out")]
     pub(super) regions: bool,
-    /// With --out, also write the detections as these tables, separated by commas
+    /// With --out, also write the detections as tables of these kinds, separated by commas
     #[arg(
         long,
         value_enum,
@@ -112,15 +112,15 @@ pub(crate) struct OutputOptions {
 /// Kinds of tables.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum TableOption {
-    /// FRAME.stars.fits: a binary table of FITS
+    /// FRAME.stars.fits: a FITS binary table
     Fits,
     /// FRAME.stars.vot: a VOTable
     Votable,
     /// FRAME.stars.ecsv: Enhanced CSV, as astropy reads it
     Ecsv,
-    /// FRAME.corr: pairs of detections and stars, as astrometry.net writes them
+    /// FRAME.corr: pairs of detections and stars, in the format of astrometry.net
     Corr,
-    /// FRAME.rdls: directions of the identified stars, as astrometry.net writes them
+    /// FRAME.rdls: directions of the identified stars, in the format of astrometry.net
     Rdls,
 }
 

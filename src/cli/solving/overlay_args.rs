@@ -8,16 +8,16 @@ use starpipe::report::overlay::{
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Picture")]
 pub(super) struct OverlayArgs {
-    /// How the picture shows the frame
+    /// Brightness scale of the picture
     #[arg(long, value_enum, default_value_t = StretchOption::Auto, requires = "out")]
     stretch: StretchOption,
-    /// Which detections are marked
+    /// Detections to mark
     #[arg(long, value_enum, default_value_t = RingsOption::Named, requires = "out")]
     rings: RingsOption,
-    /// What stars are called
+    /// Labels of the stars
     #[arg(long, value_enum, default_value_t = LabelOption::Name, requires = "out")]
     label: LabelOption,
-    /// What else of the sky is drawn, separated by commas
+    /// What else to draw, separated by commas
     #[arg(
         long,
         value_enum,
@@ -39,7 +39,7 @@ pub(super) struct OverlayArgs {
         requires = "out"
     )]
     overlay_for: Option<CutOption>,
-    /// Kind of the picture's file: FRAME.png, FRAME.jpg or FRAME.svg
+    /// File format of the picture: FRAME.png, FRAME.jpg or FRAME.svg
     #[arg(long, value_enum, default_value_t = FormatOption::Png, requires = "out")]
     overlay_format: FormatOption,
 }
@@ -49,18 +49,18 @@ pub(super) struct OverlayArgs {
 enum StretchOption {
     /// Photographs of 8 bits as they are, linear data (FITS, 16 bits) with a dark sky brightened
     Auto,
-    /// In proportion to its levels
+    /// Original levels
     None,
-    /// With a dark sky brightened
+    /// A dark sky is brightened
     Soft,
-    /// Without its background, so that faint stars show
+    /// The sky background is subtracted, so that faint stars show
     Hard,
 }
 
 /// Which detections an overlay marks.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum RingsOption {
-    /// The brightest identified stars, with their names; all where the frame is not identified
+    /// The brightest identified stars, with their names; all detections if the frame is not identified
     Named,
     /// All
     All,
@@ -90,7 +90,7 @@ enum SkyOption {
     DeepSky,
     /// Right ascension and declination
     Grid,
-    /// Azimuth and altitude, where site and time are known
+    /// Azimuth and altitude, if site and time are known
     AltazGrid,
 }
 
@@ -106,11 +106,11 @@ enum CutOption {
 /// Kinds of files.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum FormatOption {
-    /// All levels as drawn
+    /// Lossless
     Png,
-    /// Small
+    /// Small files
     Jpg,
-    /// Marks and names as lines and text, over the frame as JPEG
+    /// Marks and labels as vectors, over the frame as JPEG
     Svg,
 }
 

@@ -16,11 +16,11 @@ use std::path::PathBuf;
 const SUITES: [(&str, &str); 4] = [
     (
         "hard",
-        "Lenses, spots and detectors that are not what the pipeline assumes",
+        "Lenses, spots and detectors that differ from the pipeline's model",
     ),
     (
         "sky",
-        "Skies with Moon, clouds and extinction over an all-sky camera, which looks at the zenith",
+        "Skies with Moon, clouds and extinction over an all-sky camera that points to the zenith",
     ),
     (
         "robustness",
@@ -28,7 +28,7 @@ const SUITES: [(&str, &str); 4] = [
     ),
     (
         "clutter",
-        "Frames with foliage, clouds, trails and the like, and pictures of no sky: how often names are wrong",
+        "Frames with foliage, clouds, trails and the like, and pictures without sky: how often names are wrong",
     ),
 ];
 
@@ -82,8 +82,8 @@ pub(crate) struct ValidateArgs {
 )]
 #[command(after_help = "Examples:\n  \
     starpipe validate --suite hard --camera camera.toml --count 200 --out hard\n\n\
-    Each case is a run as starpipe validate does it: its results are in DIR/CASE/, and a row for each case is in\n\
-    suite.csv, suite.json and suite.txt. A run that was stopped goes on with the same command.")]
+    Each case is a run of starpipe validate. Its results are in DIR/CASE/, and a row for each case is in\n\
+    suite.csv, suite.json and suite.txt. The same command continues a run that was stopped.")]
 pub(crate) struct HardArgs {
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
@@ -98,9 +98,9 @@ pub(crate) struct HardArgs {
 )]
 #[command(after_help = "Examples:\n  \
     starpipe validate --suite sky --camera all-sky.toml --count 300 --out sky\n\n\
-    Date, Moon, clouds, brightness, extinction, exposure, gain, bits and bias are drawn for each frame. DIR gets\n\
-    frames.csv and cells.csv with what was drawn and what was measured, suite.csv, suite.json and suite.txt with the\n\
-    errors in groups of frames, and a figure. A run that was stopped goes on with the same command.")]
+    Date, Moon, clouds, brightness, extinction, exposure, gain, bits and bias are random for each frame. DIR gets\n\
+    frames.csv and cells.csv with true and measured values, suite.csv, suite.json and suite.txt with the errors in\n\
+    groups of frames, and a figure. The same command continues a run that was stopped.")]
 pub(crate) struct SkyArgs {
     #[command(flatten)]
     pub(super) run: RunOptions,

@@ -26,7 +26,7 @@ pub(super) fn of_run(run: ValidationRun) -> anyhow::Result<PageContent> {
     let mut page = PageContent {
         title: format!("Validation of {}", summary.facts.camera),
         question: format!(
-            "How often is a frame of {} identified, and are the stated errors true? {} at random attitudes, scale {}.",
+            "How often is a frame of {} identified, and are the stated errors correct? {} at random attitudes, scale {}.",
             summary.facts.camera,
             counted(summary.frames, "simulated frame"),
             if summary.facts.scale_known {
@@ -92,7 +92,7 @@ pub(super) fn of_sky(
         text: summary.to_text(),
         figures: vec![figure(
             sheet,
-            "Errors of the sky, and what its probabilities are worth",
+            "Errors of the sky measurement, and calibration of its probabilities",
         )],
         tables: vec![
             table("Groups", &csv_table(summary.groups.iter())?)?,
@@ -204,7 +204,7 @@ fn doubts(runs: &[TrialGroup]) -> Vec<String> {
             least = Some((share, said));
         }
     }
-    notes.extend(least.map(|(_, said)| format!("Fewest without a wrong answer: {said}")));
+    notes.extend(least.map(|(_, said)| format!("Lowest rate of right answers: {said}")));
     let nees = runs.iter().filter_map(|TrialGroup { name, nees, .. }| {
         let (mean, sigma) = (*nees)?;
         Some(format!("{name}: {}", nees_note(mean, sigma)?))
@@ -240,7 +240,7 @@ fn facts(summary: &ValidationSummary) -> Vec<Fact> {
     }
     if let Some(attitude) = &summary.attitude {
         let nees = format!("{:.3} ± {:.3}", attitude.nees_mean, attitude.nees_sigma);
-        facts.push(Fact::new("NEES, where errors are true 3", nees));
+        facts.push(Fact::new("NEES (3 expected)", nees));
         for (name, of) in [
             ("Boresight off by", &attitude.boresight_arcsec),
             ("Roll off by", &attitude.roll_arcsec),
@@ -255,7 +255,7 @@ fn facts(summary: &ValidationSummary) -> Vec<Fact> {
         .map(|(name, pull)| format!("{name} {:+.2}, {:.2}", pull.mean, pull.sd))
         .collect();
     facts.push(Fact::new(
-        "Pulls, where errors are true 0, 1 (mean, standard deviation)",
+        "Pulls (mean, standard deviation; 0, 1 expected)",
         pulls.join("; "),
     ));
     let detection = &summary.detection;
@@ -278,7 +278,7 @@ fn nees_note(mean: f64, sigma: f64) -> Option<String> {
     let too = if mean > NEES { "small" } else { "large" };
     let is_off = (mean - NEES).abs() > OFF_SIGMA * sigma;
     is_off.then(|| {
-        format!("the stated errors of the attitude are too {too}: NEES {mean:.2} ± {sigma:.2}, where they are true 3.")
+        format!("the stated errors of the attitude are too {too}: NEES {mean:.2} ± {sigma:.2}, 3 expected.")
     })
 }
 
@@ -353,11 +353,13 @@ fn tables(summary: &ValidationSummary, frames: &[RunFrameRow]) -> anyhow::Result
 
 fn caption(name: &str) -> &'static str {
     match name {
-        "identification" => "How often frames are identified, by the stars that are bright enough",
-        "completeness" => "Share of the stars that is found, and the prediction",
-        "centroids" => "Errors of centroids, and the bound that no estimate can beat",
-        "pulls" => "Errors over their stated standard errors, and the curve where these are true",
-        "faintest" => "The faintest named star against the faintest to be expected",
+        "identification" => "Identification rate by number of stars brighter than the limit",
+        "completeness" => "Detected share of the stars, and the prediction",
+        "centroids" => "Centroid errors, and the Cramér-Rao bound",
+        "pulls" => {
+            "Errors in units of their stated standard errors, with the standard normal distribution"
+        }
+        "faintest" => "Faintest named star minus the faintest expected",
         _ => "Errors of the attitude",
     }
 }

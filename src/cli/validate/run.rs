@@ -86,7 +86,9 @@ fn complete(
     let done = tables.done();
     if done > 0 {
         let directory = directory.display();
-        shared.report(format_args!("going on in {directory} after {done} frames"));
+        shared.report(format_args!(
+            "continuing in {directory} after {done} frames"
+        ));
     }
     for name in RESULTS {
         remove_outdated(&directory.join(name))?;

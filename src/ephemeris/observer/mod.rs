@@ -55,8 +55,8 @@ pub(crate) fn earth_velocity_c(years: f64) -> Vector3<f64> {
 pub enum SiteError {
     /// The text is not two or three numbers.
     #[error(
-        "'{}' is no site; expected latitude and longitude in degrees and, where known, the \
-         height in metres, with commas between them, like 52.22,4.42,3",
+        "'{}' is not a valid site; expected latitude and longitude in degrees and, where known, the \
+         height in meters, with commas between them, like 52.22,4.42,3",
         excerpt(.text)
     )]
     Malformed {
@@ -95,7 +95,7 @@ impl Site {
                 "height",
                 height_m,
                 -500.0..=1e5,
-                "from -500 to 100000 metres",
+                "from -500 to 100000 meters",
             ),
         ];
         for (quantity, found, range, expected) in ranges {

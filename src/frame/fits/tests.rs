@@ -613,7 +613,7 @@ fn a_date_that_is_unclear_is_told() {
     assert_eq!(unclear.date.unwrap().to_iso(), "2020-03-02");
     assert_eq!(
         unclear.assumed[0].to_string(),
-        "DATE-OBS may be read in two ways: found 02/03/2020, read as day, month, year"
+        "DATE-OBS is ambiguous: found 02/03/2020, read as day, month, year"
     );
     for (text, expected) in [
         (

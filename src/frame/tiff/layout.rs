@@ -34,7 +34,7 @@ pub(super) mod tag {
 
 const DEPTHS: &str = "unsigned integers of 1 to 32 or 64 bits, signed ones of 8, 16, 32 or 64, or floats of 16, 32 or 64, \
                       the same for all channels";
-const COLORS: &str = "grey or RGB, with or without alpha, or YCbCr in JPEG";
+const COLORS: &str = "gray or RGB, with or without alpha, or YCbCr in JPEG";
 const COMPRESSIONS: &str =
     "none, LZW, deflate, PackBits, JPEG (1 or 3 samples of 8 bits) or CCITT group 4 (1 bit)";
 const PREDICTORS: &str =
@@ -384,7 +384,7 @@ impl Color {
                 Err(malformed(format!("{samples} samples of a color pixel")))
             }
             _ => Err(unsupported(
-                format!("{samples} samples of a grey pixel"),
+                format!("{samples} samples of a gray pixel"),
                 COLORS,
             )),
         }

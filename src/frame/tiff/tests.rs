@@ -375,7 +375,7 @@ fn what_is_not_read_is_named_with_what_is() {
             grey().with(262, 6).with(277, 3),
             "YCbCr that is not in JPEG",
         ),
-        (grey().with(277, 3), "3 samples of a grey pixel"),
+        (grey().with(277, 3), "3 samples of a gray pixel"),
         (grey().with(259, 6), "JPEG of the old kind (compression 6)"),
         (grey().with(259, 7).with(258, 12), "JPEG of 12 bits"),
         (grey().with(259, 7).with(277, 2), "JPEG of 2 samples"),
@@ -422,7 +422,7 @@ fn the_largest_image_is_the_frame_wherever_it_is() {
         level(&later, 0),
         (
             2.0,
-            "the largest of 3 images in the file is the frame: page 2, of 40 × 30 pixels; the first has 4 × 3"
+            "the largest of 3 images in the file was read: page 2, of 40 × 30 pixels; the first has 4 × 3"
                 .to_owned()
         )
     );

@@ -48,13 +48,13 @@ pub enum Unfit {
         code: &'static str,
     },
     /// Its stars are off by the same noise as those of another frame: it is no further observation.
-    #[error("its stars have the noise of those of {of}: both are one observation")]
+    #[error("its stars have the same noise as those of {of}: it is a copy of the same exposure")]
     Copy {
         /// The name of the other.
         of: String,
     },
     /// It has another size, or is mirrored differently.
-    #[error("its size, {found}, is not that of the others, {expected}")]
+    #[error("its size, {found}, differs from that of the others, {expected}")]
     OtherSize {
         /// What it has.
         found: String,
@@ -62,7 +62,9 @@ pub enum Unfit {
         expected: String,
     },
     /// It has another focal length.
-    #[error("its focal length, {found_px:.2} px, is not that of the others, {expected_px:.2} px")]
+    #[error(
+        "its focal length, {found_px:.2} px, differs from that of the others, {expected_px:.2} px"
+    )]
     OtherFocalLength {
         /// What it has.
         found_px: f64,
@@ -71,7 +73,7 @@ pub enum Unfit {
     },
     /// The lens of the others misses its stars.
     #[error(
-        "the lens of the others misses its stars by {found_px:.2} px, and theirs by {expected_px:.2} px"
+        "the lens measured in the other frames does not fit it: residuals of {found_px:.2} px, in the others {expected_px:.2} px"
     )]
     Misfit {
         /// Median distance of its stars, in pixels.

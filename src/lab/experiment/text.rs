@@ -63,7 +63,7 @@ fn table_text(table: &TableReport) -> String {
         Some(field) => {
             let _ = writeln!(
                 text,
-                "  centre {} {}, up at {:.1}°, {:.2}″ a pixel, rms {:.2} px = {:.1}″",
+                "  center {} {}, up at {:.1}°, {:.2}″ a pixel, rms {:.2} px = {:.1}″",
                 hours(field.ra_deg, 0),
                 degrees(field.dec_deg, 0),
                 field.up_pa_deg,
@@ -86,7 +86,7 @@ fn zenith_text(table: &TableReport) -> String {
     };
     let stated_deg = table.stated_zenith_distance_deg;
     let both = format!(
-        "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and centre"
+        "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and center"
     );
     let limit = match table.limit_there_vmag {
         Some(v_mag) => format!("; there, the limit is V {v_mag:.2}"),
@@ -134,9 +134,9 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
     if let Some(expected) = &simulated.expected {
         let (mean, sigma) = (expected.mean_vmag, expected.sigma_mag);
         let limit = limit.detector_limit_vmag;
-        let why = format!("from the limit of V {limit:.2} and the stars there are");
+        let why = format!("from the limit of V {limit:.2} and the catalog stars in the field");
         line(
-            "expected of it",
+            "faintest expected",
             format!("V {mean:.2}, scatter {sigma:.2}, {why}"),
         );
         let named = simulated.stars_named;
@@ -162,8 +162,8 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
     }
     let (wrong, faintest) = (simulated.named_wrongly, simulated.faintest_wrong);
     let wrongly = match wrong {
-        0 => "none at the light of another star, or of none".to_owned(),
-        _ => format!("{wrong} on all frames; on {faintest} of these it is the faintest"),
+        0 => "none".to_owned(),
+        _ => format!("{wrong} on all frames; {faintest} of these are the faintest named star"),
     };
     line("named wrongly", wrongly);
     text += &completeness_text(simulated);

@@ -3,7 +3,7 @@
 use super::summary::{CellGroup, ClearTenth, GroupRow, SkySummary};
 use std::fmt::Write as _;
 
-const GROUPS_HEADING: &str = "Measured less true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.
+const GROUPS_HEADING: &str = "Measured minus true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.
 
                frames  right  wrong  measured                 zenith                  cells   extinction, RMS            limit    clouds, RMS    area
 ";

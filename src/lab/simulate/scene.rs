@@ -222,12 +222,12 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         sky_gradient,
         NumberRange::FromTo(0.0, 1.0),
-        "how much brighter the sky is at one border than in the centre, as a part"
+        "how much brighter the sky is at one border than in the center, as a fraction"
     ),
     key!(
         sky_gradient_deg,
         ANGLES_DEG,
-        "where it is brighter, in degrees from image-up towards the right"
+        "direction of the brighter border, in degrees from image-up towards the right"
     ),
     optional_key!(
         moon_distance_deg,
@@ -237,7 +237,7 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         moon_direction_deg,
         ANGLES_DEG,
-        "where the Moon is, in degrees from image-up towards the right"
+        "direction of the Moon, in degrees from image-up towards the right"
     ),
     key!(
         moon_phase_deg,
@@ -267,22 +267,22 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     optional_key!(
         cloud_share,
         NumberRange::FromTo(0.0, 1.0),
-        "part of the sky that clouds cover on average (else half)"
+        "mean cloud cover, as a fraction (default: 0.5)"
     ),
     optional_key!(
         cloud_bank_px,
         NumberRange::FromTo(-1e6, 1e6),
-        "one bank of clouds, whose front is so far from the centre, in pixels"
+        "a single bank of clouds: distance of its front from the center, in pixels"
     ),
     optional_key!(
         cloud_bank_deg,
         ANGLES_DEG,
-        "where the bank comes from, in degrees from image-up towards the right (else from above)"
+        "direction the bank comes from, in degrees from image-up towards the right (default: above)"
     ),
     optional_key!(
         cloud_bank_width_px,
         NumberRange::Positive,
-        "width of the bank, in pixels (else without end)"
+        "width of the bank, in pixels (default: unlimited)"
     ),
     optional_key!(
         skyline_deg,
@@ -302,68 +302,68 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         lamps,
         NumberRange::FromTo(0.0, 1000.0),
-        "lamps at the horizon, on average"
+        "mean number of lamps at the horizon"
     ),
     key!(lamp_vmag, MAGNITUDES, "V magnitude of a lamp"),
     key!(
         cosmic_rays_cm2_s,
         NumberRange::FromTo(0.0, 1e6),
-        "cosmic rays on a square centimetre in a second"
+        "cosmic rays per square centimeter and second"
     ),
     key!(
         cosmic_ray_e_um,
         NumberRange::Positive,
-        "electrons that a cosmic ray leaves on a micrometre of its way"
+        "electrons per micrometer of a cosmic ray's path"
     ),
     key!(
         trails,
         NumberRange::FromTo(0.0, 1e4),
-        "trails of satellites on a frame, on average"
+        "mean number of satellite trails on a frame"
     ),
     key!(trail_vmag, MAGNITUDES, "V magnitude of such a satellite"),
     key!(
         trail_rate_deg_s,
         NumberRange::Positive,
-        "how fast it moves, in degrees a second"
+        "angular speed of such a satellite, in degrees per second"
     ),
     key!(
         by_altitude,
         NumberRange::FromTo(0.0, 1.0),
-        "1 for air and airglow that grow thicker towards the horizon, 0 for the same over the frame"
+        "1: airmass and airglow increase towards the horizon; 0: they are the same over the frame"
     ),
     key!(
         false_stars,
         NumberRange::FromTo(0.0, 1e6),
-        "false stars on a frame, on average"
+        "mean number of false stars on a frame"
     ),
     optional_key!(
         false_star_vmag,
         MAGNITUDES,
-        "V magnitude of the faintest false star (else the camera's limit)"
+        "V magnitude of the faintest false star (default: the camera's limit)"
     ),
     key!(
         missing,
         NumberRange::FromTo(0.0, 1.0),
-        "part of the catalogue's stars that are not in the sky"
+        "fraction of the catalog's stars that are missing in the sky"
     ),
     key!(
         vmag_sigma,
         NumberRange::FromTo(0.0, 10.0),
-        "standard deviation of the stars' magnitudes about the catalogue's"
+        "standard deviation of the stars' magnitudes about the catalog's"
     ),
     optional_key!(
         faintest_vmag,
         MAGNITUDES,
-        "V magnitude of the faintest star that is drawn (else the catalogue's)"
+        "V magnitude of the faintest simulated star (default: the catalog's faintest)"
     ),
     optional_key!(
         milky_way,
         NumberRange::NotNegative,
-        "light of the Milky Way's faint stars, over what it is (else none)"
+        "light of the Milky Way's faint stars, relative to the real one (default: none)"
     ),
     key!(
         stray_light,
         NumberRange::FromTo(0.0, 1.0),
-        "light that an all-sky lens scatters outside its circle, over the mean of the sky in it"
+        "light that an all-sky lens scatters outside its image circle, relative to the mean sky inside"
     ),
 ];

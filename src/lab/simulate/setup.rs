@@ -88,7 +88,7 @@ impl Setup {
                 .any(|corner| camera.direction_of(corner).is_none());
         if found_px > most_px {
             return Some(format!(
-                "the image folds: the radial distortion, or twice the decentring and the stretch, is {found_px} \
+                "the image folds: the radial distortion, or twice the decentering and the stretch, is {found_px} \
                  pixels, expected at most {most_px:.1} on this detector"
             ));
         }

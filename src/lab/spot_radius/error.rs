@@ -37,7 +37,7 @@ pub enum NoiseError {
     NoRelativeNoise,
     /// The noise from frame to frame could not be measured.
     #[error(
-        "the dark frames have no temporal noise: expected two or more of one exposure, with a noise above half a grey level"
+        "the dark frames have no temporal noise: expected two or more of one exposure, with a noise above half a gray level"
     )]
     NoTemporalNoise,
     /// The noise is zero.

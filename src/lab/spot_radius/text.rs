@@ -35,8 +35,8 @@ impl DefocusReport {
         let mut text = normalisation_text(self.stars.first().and_then(|star| star.peak));
         let centroid = match self.centroid {
             Centroiding::GaussianFit => "fit of a Gaussian spot",
-            Centroiding::GreyWeighted => "centre of the light above a threshold",
-            Centroiding::FixedWindow => "centre of the light in a fixed window",
+            Centroiding::GreyWeighted => "center of the light above a threshold",
+            Centroiding::FixedWindow => "center of the light in a fixed window",
         };
         let noise = match (self.noise.e, self.noise.relative) {
             (Some(e), _) => format!("{} e of a pixel in the dark", five_digits(e)),
@@ -70,7 +70,7 @@ impl DefocusReport {
         lines.push(("best".to_owned(), self.best_text(&star.best)));
         if let Some(present) = &star.present {
             let value = self.radius_and_error_text(present);
-            lines.push(("the camera as it is".to_owned(), value));
+            lines.push(("the camera as described".to_owned(), value));
         }
         lines
     }
@@ -81,7 +81,7 @@ impl DefocusReport {
             "{}; within 5 % of it from {from:.2} to {to:.2} px{}",
             self.radius_and_error_text(&best.radius),
             if best.is_at_edge {
-                "; at the edge of the radii asked for"
+                "; at the edge of the range of radii"
             } else {
                 ""
             }
@@ -91,7 +91,7 @@ impl DefocusReport {
     fn required_text(&self, star: &DefocusStarReport, required: &RequiredError) -> String {
         let (Some(smallest), Some(largest)) = (&required.smallest, &required.largest) else {
             return format!(
-                "no radius: the best that can be had is {:.4} px, with {:.2} px",
+                "no radius: the smallest error is {:.4} px, at {:.2} px",
                 star.best.radius.error_px, star.best.radius.radius_px
             );
         };
@@ -99,7 +99,7 @@ impl DefocusReport {
         match required.is_at_edge {
             [false, true] => format!("from {smallest} up"),
             [true, false] => format!("up to {largest}"),
-            [true, true] => "all radii asked for".to_owned(),
+            [true, true] => "all radii".to_owned(),
             [false, false] => format!("from {smallest} to {largest}"),
         }
     }
@@ -118,7 +118,7 @@ impl DefocusReport {
             (Some(um), _) => {
                 let _ = write!(text, ", {um:.1} µm out of focus");
             }
-            (None, Some(_)) => text += ", sharper than in focus",
+            (None, Some(_)) => text += ", smaller than in focus",
             (None, None) => (),
         }
         text
@@ -196,19 +196,18 @@ impl DefocusReport {
 fn normalisation_text(peak: Option<f64>) -> String {
     match peak {
         Some(peak) => format!(
-            "normalisation peak: the brightest pixel has {} of full scale at every radius, a wider spot more light.\n\
-             A real star's light does not grow with its spot: that is normalisation energy.\n",
+            "normalisation peak: the brightest pixel has {} of full scale at every radius, so a wider spot has more light.\n\
+             For a real star the total light is constant: use normalisation energy.\n",
             five_digits(peak)
         ),
-        None => {
-            "normalisation energy: the star has the light it has, whatever the radius\n".to_owned()
-        }
+        None => "normalisation energy: the total light of the star is the same at every radius\n"
+            .to_owned(),
     }
 }
 
 fn lens_text(lens: &DefocusLens) -> String {
     format!(
-        "defocus: geometric blur alone, at f/{} with a spot of {} px in focus; diffraction makes {} px at {} nm\n",
+        "defocus: geometric blur alone, at f/{} with a spot of {} px in focus; diffraction limit {} px at {} nm\n",
         five_digits(lens.f_number),
         five_digits(lens.focused_px),
         five_digits((lens.diffraction_px() * 1e3).round() / 1e3),

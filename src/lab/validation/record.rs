@@ -17,8 +17,8 @@ table_row! {
     FrameRecord in "frames" {
         frame: u64, "", "meta.id;meta.main", "number of the frame, from 0";
         seed: u64, "", "", "seed of the random numbers in its pixels";
-        ra_deg: f64, "deg", "pos.eq.ra;meta.main", "true right ascension of the centre (ICRS)";
-        dec_deg: f64, "deg", "pos.eq.dec;meta.main", "true declination of the centre (ICRS)";
+        ra_deg: f64, "deg", "pos.eq.ra;meta.main", "true right ascension of the center (ICRS)";
+        dec_deg: f64, "deg", "pos.eq.dec;meta.main", "true declination of the center (ICRS)";
         up_pa_deg: f64, "deg", "pos.posAng", "true position angle of the picture's up direction";
         status: Answer, "", "meta.code.status", "right, wrong or none";
         reason: Option<String>, "", "meta.code", "why it is not identified, as a code";
@@ -56,7 +56,7 @@ table_row! {
         zero_point_sigma_mag: Option<f64>, "mag", "stat.stdev", "standard error of the zero point";
         linearity: Option<f64>, "", "stat.fit.param", "instrumental magnitudes per magnitude of V; 1 is true";
         linearity_sigma: Option<f64>, "", "stat.stdev", "standard error of the linearity";
-        notes: Option<String>, "", "meta.note", "codes of what is odd about the frame";
+        notes: Option<String>, "", "meta.note", "codes of the notes on the frame";
     }
 }
 
@@ -67,7 +67,7 @@ table_row! {
     StarRecord in "stars" {
         frame: u64, "", "meta.id", "number of the frame";
         kind: RowKind, "", "meta.code.class", "star, blend or false";
-        id: Option<String>, "", "meta.id;meta.main", "identifier in the catalogue";
+        id: Option<String>, "", "meta.id;meta.main", "identifier in the catalog";
         vmag: Option<f64>, "mag", "phot.mag;em.opt.V", "true Johnson V";
         bv_mag: Option<f64>, "mag", "phot.color;em.opt.B;em.opt.V", "true B-V";
         true_x_px: Option<f64>, "pix", "pos.cartesian.x;instr.det", "true place along the rows, from 0";

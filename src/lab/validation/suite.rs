@@ -66,12 +66,12 @@ pub const HARD_SUITE: [HardCase; 20] = [
     },
     HardCase {
         name: "lens-decentred",
-        what: "r³ and r⁵, decentred",
+        what: "r³ and r⁵, decentered",
         change: |run| lens(run, &[28.0, -11.0, 0.0, 0.0, 0.0, 2.8, -1.4]),
     },
     HardCase {
         name: "lens-off-centre",
-        what: "r³, and the axis 2 % of half of the diagonal off the centre",
+        what: "r³, and the axis 2 % of half of the diagonal off the center",
         change: |run| lens(run, &[-50.0, 0.0, 0.0, 16.0, 12.0]),
     },
     HardCase {
@@ -173,7 +173,7 @@ fn lens(run: &mut ValidationProtocol, thousandths: &[f64]) {
     ] = std::array::from_fn(|term| thousandths.get(term).map_or(0.0, |given| given * unit_px));
 }
 
-const HEADING: &str = "Mean and standard deviation of errors over stated errors, 0 and 1 where these are true; NEES 3.
+const HEADING: &str = "Mean and standard deviation of errors over stated errors, 0 and 1 expected; NEES 3 expected.
 
                  frames  right  wrong   NEES     x     y           flux   focal length     zero point   limit  split  notes
 ";

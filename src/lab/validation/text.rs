@@ -13,7 +13,7 @@ Centroids of isolated stars that are not saturated, errors on one axis
 const PULLS_HEADING: &str = "
 Pulls: errors in units of their stated standard errors
                     values      mean       sd  beyond 2  beyond 3  beyond 5
-  where true                       0        1    4.55 %    0.27 %    0.00 %
+    expected                         0        1    4.55 %    0.27 %    0.00 %
 ";
 
 impl ValidationSummary {
@@ -67,9 +67,9 @@ impl ValidationSummary {
         let d = &self.detection;
         let per_frame = |count: u64| count as f64 / self.frames.max(1) as f64;
         format!(
-            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}, {} of these as a star that stands there as well\n  \
-             false: {} on all frames, {} in a million pixels (95 %: {} to {}), asked for {}\n  \
-             blends {}, taken for no stars {}, stars found as several {}\n",
+            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}, {} of these as another star at the same position\n  \
+             false: {} on all frames, {} per million pixels (95 %: {} to {}), accepted {}\n  \
+             blends {}, rejected as not stars {}, stars detected as several {}\n",
             per_frame(d.detected),
             per_frame(d.named),
             d.misnamed,
@@ -243,7 +243,7 @@ fn attitude_text(attitude: &AttitudeSummary) -> String {
     let _ = writeln!(
         text,
         "  root mean square: about x {x:.3}, about y {y:.3}, roll {roll:.3}\n  \
-         mean of the squared error in units of its covariance {:.3}, where that is true 3 ± {:.3}\n  \
+         mean of the squared error in units of its covariance {:.3}, expected 3 ± {:.3}\n  \
          residuals {:.4} px root mean square",
         attitude.nees_mean, attitude.nees_sigma, attitude.rms_px
     );

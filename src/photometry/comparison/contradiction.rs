@@ -89,7 +89,7 @@ impl fmt::Display for Contradiction {
                 camera_rad,
             } => write!(
                 f,
-                "a pixel spans {:.2}″, by the camera's focal length and pitch {:.2}″",
+                "the pixel scale is {:.2}″; the camera's focal length and pixel pitch give {:.2}″",
                 measured_rad * ARCSEC_PER_RAD,
                 camera_rad * ARCSEC_PER_RAD
             ),
@@ -98,31 +98,31 @@ impl fmt::Display for Contradiction {
                 camera_px,
             } => write!(
                 f,
-                "the stars' spots have a standard deviation of {measured_px:.2} px, the camera's {camera_px:.2} px"
+                "the spots of stars have a standard deviation of {measured_px:.2} px; that in the camera's description is {camera_px:.2} px"
             ),
             Self::BelowBias {
                 background_adu,
                 bias_adu,
             } => write!(
                 f,
-                "the background's level is {background_adu:.1}, below the camera's bias of {bias_adu}"
+                "the background level is {background_adu:.1}, below the camera's bias of {bias_adu}"
             ),
             Self::Noise {
                 measured_e,
                 expected_e,
             } => write!(
                 f,
-                "the background's noise is {measured_e:.1} electrons, that of its level by the camera's gain, bias and read noise {expected_e:.1}"
+                "the background noise is {measured_e:.1} electrons; its level and the camera's gain, bias and read noise give {expected_e:.1}"
             ),
             Self::ZeroPoint { difference_mag } => {
                 let cause = if difference_mag < 0.0 {
-                    "less light arrives than the camera should see: haze, a stop, dew, another exposure or gain"
+                    "less light arrives than predicted: haze, dew, a smaller aperture, or another exposure or gain"
                 } else {
-                    "more light arrives than the camera should see: another aperture, exposure or gain"
+                    "more light arrives than predicted: another aperture, exposure or gain"
                 };
                 write!(
                     f,
-                    "the zero point is {difference_mag:+.2} mag off the camera's; {cause}"
+                    "the zero point differs by {difference_mag:+.2} mag from the predicted one; {cause}"
                 )
             }
             Self::ZenithDistance {
@@ -130,7 +130,7 @@ impl fmt::Display for Contradiction {
                 observed_deg,
             } => write!(
                 f,
-                "the zenith distance is stated as {stated_deg:.1}°, by site, date and attitude it is {observed_deg:.1}°"
+                "the stated zenith distance is {stated_deg:.1}°, but site, date and attitude give {observed_deg:.1}°"
             ),
         }
     }

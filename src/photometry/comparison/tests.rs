@@ -148,34 +148,37 @@ fn each_contradiction_has_its_sentence() {
     assert!(
         sentences(&|_, f| f.size_px = [100, 90]).contains("100 × 90 pixels, the camera 752 × 582")
     );
-    assert!(sentences(&|_, f| f.pixel_scale_rad = Some(1e-4)).contains("a pixel spans 20.63″"));
     assert!(
-        sentences(&|_, f| f.spot_sigma_px = Some(3.0)).contains("3.00 px, the camera's 1.16 px")
+        sentences(&|_, f| f.pixel_scale_rad = Some(1e-4)).contains("the pixel scale is 20.63″")
+    );
+    assert!(
+        sentences(&|_, f| f.spot_sigma_px = Some(3.0))
+            .contains("3.00 px; that in the camera's description is 1.16 px")
     );
     assert!(
         sentences(&|_, f| f.background_adu = 100.0)
             .contains("level is 100.0, below the camera's bias of 128")
     );
-    assert!(sentences(&|_, f| f.noise_adu *= 2.0).contains("the background's noise is"));
+    assert!(sentences(&|_, f| f.noise_adu *= 2.0).contains("the background noise is"));
     let zero = compare(&stated(), &measured(16.0)).unwrap().zero_point_vmag;
     let off = sentences(&|_, f| {
         let value = zero - 1.0;
         f.zero_point_vmag = Some(Estimate { value, sigma: 0.02 });
     });
-    assert!(off.contains("zero point is -1.00 mag off"), "{off}");
+    assert!(off.contains("zero point differs by -1.00 mag"), "{off}");
     let off = sentences(&|d, f| {
         d.zenith_distance_deg = Some(0.0);
         f.zenith_distance_deg = Some(56.0);
     });
     assert!(
-        off.contains("stated as 0.0°, by site, date and attitude it is 56.0°"),
+        off.contains("stated zenith distance is 0.0°, but site, date and attitude give 56.0°"),
         "{off}"
     );
     let off = sentences(&|_, f| {
         f.header_zenith_distance_deg = Some(20.0);
         f.zenith_distance_deg = Some(56.0);
     });
-    assert!(off.contains("stated as 20.0°"), "{off}");
+    assert!(off.contains("stated zenith distance is 20.0°"), "{off}");
 }
 
 #[test]

@@ -58,7 +58,7 @@ pub struct ZeroPoint {
 pub enum NoZeroPoint {
     /// Too few stars.
     #[error(
-        "too few stars: {detected} of the catalogue's stars that stand alone in the frame were detected, and a zero point takes {MIN_STARS}"
+        "too few stars: {detected} isolated catalog stars were detected, and a zero point needs {MIN_STARS}"
     )]
     FewDetected {
         /// Stars that stand alone and were detected.
@@ -66,7 +66,7 @@ pub enum NoZeroPoint {
     },
     /// Too few stars whose light is known and whole.
     #[error(
-        "too few stars: of {detected} that stand alone and were detected, {fit} are constant and single with unsaturated, unblended light, and a zero point takes {MIN_STARS}"
+        "too few stars: of {detected} isolated stars detected, {fit} are single, not variable, not saturated and not blended, and a zero point needs {MIN_STARS}"
     )]
     FewFit {
         /// Stars that stand alone and were detected.

@@ -195,7 +195,7 @@ fn add_errors(header: &mut FitsHeader, identification: &Identification) {
     for (keyword, axis) in [("CRDER1", east), ("CRDER2", north)] {
         let sigma_rad = libm::hypot(axis[0] * sigma_y, axis[1] * sigma_x);
         let sigma_deg = sigma_rad * DEG_PER_RAD;
-        header.real(keyword, sigma_deg, "standard error of the centre");
+        header.real(keyword, sigma_deg, "standard error of the center");
     }
 }
 

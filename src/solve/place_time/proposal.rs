@@ -98,7 +98,7 @@ impl fmt::Display for Proposal {
             Change::Exchanged => write!(f, "the site {lat:.2},{lon:.2} (exchanged)"),
             Change::Place => write!(
                 f,
-                "another site, near {lat:.0},{lon:.0} if the camera looks straight up"
+                "another site, near {lat:.0},{lon:.0} if the camera points to the zenith"
             ),
             Change::OrderOfDate => write!(
                 f,
@@ -158,16 +158,16 @@ impl fmt::Display for PlaceTime {
             .collect();
         write!(
             f,
-            "the site or the time is not this frame's, and neither is used: {}; ",
+            "the stars contradict the site or the time, and neither is used: {}; ",
             reasons.join("; ")
         )?;
         let proposals: Vec<String> = self.proposals.iter().map(ToString::to_string).collect();
         match &proposals[..] {
-            [] => f.write_str("no single change of a sign, the hours, or the date puts it right"),
-            [only] => write!(f, "{only} would put it right"),
+            [] => f.write_str("no single change of a sign, the time or the date resolves this"),
+            [only] => write!(f, "{only} would resolve this"),
             [others @ .., last] => write!(
                 f,
-                "one of these would put it right: {}; or {last}",
+                "one of these would resolve this: {}; or {last}",
                 others.join("; ")
             ),
         }
@@ -183,20 +183,20 @@ impl fmt::Display for Contradiction {
                 lowest_rad,
             } => write!(
                 f,
-                "{below} of {named} sure stars would be below the horizon, down to {:.0}°",
+                "{below} of {named} identified stars would be below the horizon, down to {:.0}°",
                 lowest_rad * DEG_PER_RAD
             ),
             Self::Refraction { .. } => f.write_str(
-                "with the refraction there the stars are farther from their places than without any",
+                "the stars fit worse with the refraction at that site and time than without refraction",
             ),
             Self::SunIsUp { altitude_rad } => write!(
                 f,
-                "the Sun would stand at an altitude of {:.0}°, and hide the fainter of the stars",
+                "the Sun would be at an altitude of {:.0}°, and the fainter stars could not be seen",
                 altitude_rad * DEG_PER_RAD
             ),
             Self::Planets { missing, seen } => write!(
                 f,
-                "{} would be in the frame and is not, and where {} is at another date there is a bright source that is no star",
+                "{} should be in the frame but is not, and a bright source that is not a star is where {} would be on another date",
                 missing.name(),
                 seen.name()
             ),

@@ -20,15 +20,15 @@ table_row! {
         status: String, "", "meta.code.status", "identified, not_identified or unread";
         reason_code: String, "", "meta.code", "why it is not identified, as a code";
         reason: String, "", "meta.note", "why it is not identified";
-        night: String, "", "time.epoch", "date of the evening before, in local mean time where the site is known";
+        night: String, "", "time.epoch", "date of the evening before, in local mean time if the site is known";
         t_min: Option<f64>, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
         exposure_s: Option<f64>, "s", "time.duration;obs.exposure", "exposure";
-        camera: String, "", "meta.id;instr", "the stated camera";
+        camera: String, "", "meta.id;instr", "name of the camera";
         width: Option<u64>, "pix", "", "columns of the frame";
         height: Option<u64>, "pix", "", "rows of the frame";
-        row_order: String, "", "meta.code", "order of the rows in the file; pixels count from the top of the picture in either";
-        ra_deg: Option<f64>, "deg", "pos.eq.ra;meta.main", "right ascension of the centre (ICRS)";
-        dec_deg: Option<f64>, "deg", "pos.eq.dec;meta.main", "declination of the centre (ICRS)";
+        row_order: String, "", "meta.code", "order of the rows in the file; y is counted from the top of the picture in either case";
+        ra_deg: Option<f64>, "deg", "pos.eq.ra;meta.main", "right ascension of the center (ICRS)";
+        dec_deg: Option<f64>, "deg", "pos.eq.dec;meta.main", "declination of the center (ICRS)";
         s_fov: Option<f64>, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
         s_region: String, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
         up_pa_deg: Option<f64>, "deg", "pos.posAng", "position angle of the picture's up direction";
@@ -50,18 +50,18 @@ table_row! {
         matched: Option<u64>, "", "meta.number", "detections with the name of a star";
         rms_px: Option<f64>, "pix", "stat.fit.residual", "RMS residual of the named stars";
         log10_false_alarm: Option<f64>, "", "stat.probability", "log10 of the false-alarm probability";
-        background: Option<f64>, "", "instr.background", "median background, in units of the frame";
-        noise: Option<f64>, "", "stat.stdev;instr.background", "noise of a pixel, in units of the frame";
-        zero_point_vmag: Option<f64>, "mag", "phot.mag;arith.zp", "V magnitude of a star that gives 1 unit, a second where the exposure is known";
+        background: Option<f64>, "", "instr.background", "median background, in the units of the frame";
+        noise: Option<f64>, "", "stat.stdev;instr.background", "noise of a pixel, in the units of the frame";
+        zero_point_vmag: Option<f64>, "mag", "phot.mag;arith.zp", "V magnitude of a star with a flux of 1 unit, per second if the exposure is known";
         zero_point_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;arith.zp", "standard error of the zero point";
         limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
         limit50_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limit";
-        predicted_limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;meta.modelled", "the limit that the stated camera should reach";
+        predicted_limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;meta.modelled", "limiting magnitude predicted for the camera";
         limit_difference_mag: Option<f64>, "mag", "phot.mag;arith.diff", "measured minus predicted limit";
         faintest_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude of the faintest named star";
         sky_mag_arcsec2: Option<f64>, "mag/arcsec**2", "phot.mag.sb;em.opt.V", "sky brightness";
-        airmass: Option<f64>, "", "obs.airMass", "airmass of the centre";
-        notes: String, "", "meta.note", "codes of what is odd about the frame";
+        airmass: Option<f64>, "", "obs.airMass", "airmass of the center";
+        notes: String, "", "meta.note", "codes of the notes on the frame";
         star_rows: u64, "", "meta.number", "rows of the frame in the table of stars";
     }
 }

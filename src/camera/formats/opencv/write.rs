@@ -48,10 +48,10 @@ pub fn opencv_yaml_within(camera: &CameraModel, tolerance_px: f64) -> Result<Str
     let mut text = String::from("%YAML:1.0\n---\n");
     // Writing to a text does not fail.
     let _ = match lens.largest_px {
-        None => writeln!(text, "# Exactly the lens that was measured."),
+        None => writeln!(text, "# Exactly the measured lens."),
         Some(largest_px) => writeln!(
             text,
-            "# Fitted to the lens that was measured; largest error on the frame: {largest_px:.4} px."
+            "# Fitted to the measured lens; largest error on the frame: {largest_px:.4} px."
         ),
     };
     if camera.mirrored {
@@ -73,7 +73,7 @@ pub fn opencv_yaml_within(camera: &CameraModel, tolerance_px: f64) -> Result<Str
     text.push_str("# From starpipe's camera axes to OpenCV's.\n");
     let to_lens: Vec<f64> = lens.camera_to_lens.transpose().iter().copied().collect();
     write_matrix(&mut text, "camera_to_lens", MATRIX, [3, 3], &to_lens);
-    text.push_str("# Beyond this angle from the axis nothing is known of the lens.\n");
+    text.push_str("# The lens was measured up to this angle from the axis.\n");
     let valid_to_deg = lens.max_angle_rad * DEG_PER_RAD;
     let _ = writeln!(text, "valid_to_deg: {}", number(valid_to_deg));
     let largest_px = lens.largest_px.unwrap_or(0.0);

@@ -16,7 +16,7 @@ use std::path::PathBuf;
     starpipe validate --suite clutter --camera camera.toml --kinds sky --count 250 --format csv > clutter.csv\n  \
     starpipe validate --suite clutter --preset imx174-35mm --kinds foliage,jpeg --count 5 --pictures pictures\n\n\
     Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
-    processed with nothing known beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
+    processed without hints beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
     Without --camera or --preset, every built-in camera is simulated in turn.\n\
     Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg,\n\
     blends, hot-pixels, cosmic-rays;\n\

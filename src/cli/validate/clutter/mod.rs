@@ -68,9 +68,9 @@ impl Table {
 fn introduction(protocol: &ClutterProtocol) -> String {
     let camera = &protocol.setup.scenario.camera;
     format!(
-        "{} frames of each kind, seed {}; {}, {} × {} px; nothing known beforehand.\n\
-         wrong frames: another pointing, or no sky at all. false/Mpx: detections without a star, clutter included.\n\
-         wrong names: that star is not there, or a nearer one outshines it; stated: what the stated probabilities add up to.\n\n",
+        "{} frames of each kind, seed {}; {}, {} × {} px; no hints.\n\
+         wrong frames: wrong pointing, or a picture without sky. false/Mpx: detections without a star, clutter included.\n\
+         wrong names: the star is not there, or is outshone by a nearer one; stated: sum of the stated probabilities.\n\n",
         protocol.frames, protocol.seed, camera.name, camera.width_px, camera.height_px,
     )
 }

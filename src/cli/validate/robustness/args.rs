@@ -18,7 +18,7 @@ const MAX_BRIGHT_FALSE: i64 = 100_000;
     starpipe validate --suite robustness\n  \
     starpipe validate --suite robustness --count 10000 --stars 20 --format csv > robustness.csv\n  \
     starpipe validate --suite robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
-    Lists of centroids are drawn from the catalogue, at attitudes uniform over all rotations, with errors, missing\n\
+    Lists of centroids are drawn from the catalog, at attitudes uniform over all rotations, with errors, missing\n\
     and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
     standard one: five fields of view, then one worse condition at a time in a field of 10 degrees,\n\
     and wide fields of unknown size.")]
@@ -60,7 +60,7 @@ pub(super) struct ProtocolOptions {
     /// Height of the frame in pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(3..=MAX_SIDE_PX))]
     pub(super) height: u32,
-    /// Mean number of catalogue stars on a frame, which sets the limiting magnitude
+    /// Mean number of catalog stars on a frame, which sets the limiting magnitude
     #[arg(long, value_name = "NUMBER", default_value_t = 30.0, value_parser = values::star_count)]
     pub(super) stars: f64,
     /// Standard deviation of centroids on each axis, in pixels

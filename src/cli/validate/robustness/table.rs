@@ -22,8 +22,8 @@ fn introduction(arguments: &RobustnessArgs) -> String {
         format!("known to {} %", protocol.scale_error)
     };
     format!(
-        "{} trials a row, seed {}; {} × {} px, {} stars on average; unless the row says otherwise centroids {} px and \
-         magnitudes {} off, {} % of the stars missing, {} % false, field of view {scale}.\n\
+        "{} trials a row, seed {}; {} × {} px, {} stars on average; unless the row says otherwise centroid errors of {} px, \
+         magnitude errors of {}, {} % of the stars missing, {} % false, field of view {scale}.\n\
          Rates are of the trials with {} true stars or more, with 95 % intervals; wrong answers and times are of all trials.\n\n",
         arguments.count,
         arguments.seed,
