@@ -26,6 +26,9 @@ pub(super) struct PageData<'a> {
     predicted_vmag: Option<f64>,
     /// Lines and names of the sky.
     pub(super) sky: Vec<SkyLayer>,
+    /// What the report names in the frame, where it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    annotations: Option<serde_json::Value>,
 }
 
 /// The columns of the detections, which take half of the room of rows with names.
@@ -94,8 +97,15 @@ impl<'a> PageData<'a> {
             limit50_vmag: photometry.and_then(|photometry| photometry.limit50_vmag),
             predicted_vmag: report.prediction.as_ref().and_then(|p| p.limit50_vmag),
             sky: found.map_or_else(Vec::new, |found| sky_layers(size, found)),
+            annotations: annotations(report),
         }
     }
+}
+
+/// The annotations of the report as its JSON has them.
+fn annotations(report: &FrameReport) -> Option<serde_json::Value> {
+    let mut fields = serde_json::to_value(report).ok()?;
+    fields.get_mut("annotations").map(serde_json::Value::take)
 }
 
 /// Observed minus predicted positions of the identified stars, in the order of the detections.
