@@ -87,7 +87,7 @@ const ofBoxes = (bytes) => {
   return piece ? piece.subarray(4 + viewOf(piece).getUint32(0)) : null;
 };
 
-/** Without a word of how to turn the picture: the browser turned it. @param {Uint8Array} exif */
+/** Without a word of how to turn the picture: the boxes of the file have one, which the browser heeds. @param {Uint8Array} exif */
 const upright = (exif) => {
   const ORIENTATION = 0x0112;
   const turned = exif.slice(), view = viewOf(turned), isLittle = nameAt(turned, 0).startsWith("II");
@@ -104,7 +104,8 @@ export const exifOf = (bytes, format) => {
     const found = format === "WebP" ? ofWebp(bytes) : ofBoxes(bytes);
     if (!found) return null;
     const exif = nameAt(found, 0) === "Exif" ? found.subarray(6) : found;
-    return /^(II|MM)/.test(nameAt(exif, 0)) ? upright(exif) : null;
+    if (!/^(II|MM)/.test(nameAt(exif, 0))) return null;
+    return format === "WebP" ? exif : upright(exif);
   } catch (error) {
     // Offsets that leave the file.
     if (error instanceof RangeError) return null;

@@ -106,10 +106,18 @@ const label = (picture) => {
   picture.button.setAttribute("aria-label", `${picture.file.name}, ${state}`);
   picture.button.setAttribute("aria-pressed", String(picture === chosen));
   const waiting = pictures.filter(({ state }) => state === "waits").length;
-  byId("queue-bar").hidden = !pictures.length;
   byId("queue-count").textContent = pictures.length > 1 ? `${pictures.filter(({ state }) => state === "done").length} of ${pictures.length} are solved.` : "";
   byId("cancel-all").hidden = !running || !waiting;
-  document.body.classList.toggle("has-pictures", pictures.length > 0);
+  tellWhetherEmpty();
+};
+
+/** The next visit leaves room for what is kept, see early.js. */
+const tellWhetherEmpty = () => {
+  const has = pictures.length > 0;
+  document.documentElement.classList.toggle("has-pictures", has);
+  try {
+    localStorage.setItem("has-pictures", has ? "1" : "");
+  } catch { /* it jumps a little */ }
 };
 
 const keep = ({ file, id, state, status, tries, options, equipment, images, error }) => keepPicture({ file, id, state, status, tries, options, equipment, images, error, build: BUILD });
@@ -152,6 +160,7 @@ const restore = async () => {
     if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was given up: the page ended while it was solved.` });
     enqueue(kept);
   }
+  tellWhetherEmpty();
   if (pictures.length) choose(pictures.find(({ state }) => state === "done") ?? pictures[0]);
   next();
 };
@@ -162,9 +171,9 @@ const clear = async () => {
   stop();
   [chosen, byId("again").disabled] = [null, true];
   byId("queue").replaceChildren();
-  for (const id of ["answer", "say"]) byId(id).replaceChildren();
-  for (const id of ["preview", "queue-bar"]) byId(id).hidden = true;
-  document.body.classList.remove("has-pictures");
+  byId("answer").replaceChildren();
+  byId("preview").hidden = true;
+  tellWhetherEmpty();
   await clearAll();
   tell("Ready for your picture.");
 };
@@ -373,6 +382,7 @@ const addExample = async (name) => {
 const takeShared = async () => {
   try {
     const cache = await caches.open(SHARED_CACHE);
+    if (location.search) history.replaceState(null, "", location.pathname + location.hash);
     const files = await Promise.all((await cache.keys()).map(async (request) => {
       const response = await cache.match(request);
       await cache.delete(request);

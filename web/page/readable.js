@@ -83,8 +83,9 @@ const pngOf = ({ width, height, data }, exif) => {
 
 /** @param {File} file @param {string} format */
 const pixelsOf = async (file, format) => {
-  // The levels as they are stored, without a change of colors.
-  const bitmap = await createImageBitmap(file, { colorSpaceConversion: "none", premultiplyAlpha: "none" })
+  // The levels as they are stored, without a change of colors. HEIC and AVIF have turns of their own, beside Exif's.
+  const imageOrientation = format === "WebP" ? "none" : "from-image";
+  const bitmap = await createImageBitmap(file, { colorSpaceConversion: "none", premultiplyAlpha: "none", imageOrientation })
     .catch(() => { throw new Error(`${file.name}: this browser does not open ${format}. Save the photograph as JPEG or PNG.`); });
   const canvas = new OffscreenCanvas(bitmap.width, bitmap.height), pen = canvas.getContext("2d", { willReadFrequently: true });
   if (!pen) throw new Error(`${file.name}: no memory for the picture`);

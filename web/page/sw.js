@@ -23,7 +23,7 @@ const takeShared = async (request) => {
   const cache = await caches.open(SHARED_CACHE);
   const files = (await request.formData()).getAll("pictures").filter((file) => file instanceof File);
   await Promise.all(files.map((file, at) => cache.put(`shared/${at}/${encodeURIComponent(file.name)}`, new Response(file))));
-  return Response.redirect("./#photo", 303);
+  return Response.redirect("./?shared", 303);
 };
 
 addEventListener("install", (event) => event.waitUntil(keep()));

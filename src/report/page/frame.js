@@ -185,6 +185,8 @@ const showFrame = (root, data) => {
       if (taken.length >= MOST + skyNames.length) break;
       const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
       const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
+      // To the left of its star where it would leave the picture.
+      if (roomOf(...at, text)[2] > box.x + box.w) at[0] = star.x - (radius(star) + 4 + text.length * SIZE * 0.55) * u;
       const room = roomOf(...at, text);
       if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
       taken.push(room);
