@@ -115,8 +115,8 @@ const ready = async (page) => {
 };
 /** Gives files as a visitor does: what moves at once is no shift of the layout. */
 const give = async (page, files) => {
-  const [chooser] = await Promise.all([page.waitForEvent("filechooser"), page.locator("label[for=files]").click()]);
-  await chooser.setFiles(files);
+  await page.mouse.click(2, 2);
+  await page.locator("#files").setInputFiles(files);
 };
 /** Whether the picture that is shown is identified. */
 const isIdentified = async (page) => (await page.locator("#answer .say").count()) === 1 && (await page.locator("#queue button[aria-pressed=true][aria-label$=', identified']").count()) === 1;
@@ -730,12 +730,36 @@ async function usePhone() {
   check((await page.locator("#queue button[aria-label$=', identified']").count()) === 3, "a reload loses answers");
   await page.locator("#queue button").last().tap();
   await page.waitForFunction((said) => document.querySelector(".say")?.textContent === said, said, { timeout: 5000 });
+  await useAnnotations(page);
   await useQueue(page);
   await useShareTarget(page);
   const layoutShift = await page.evaluate(() => globalThis.shift);
   console.log(`on a phone: layout shift ${layoutShift.toFixed(3)}`);
   check(layoutShift < 0.1, `the layout shifts by ${layoutShift.toFixed(3)} on a phone`);
   await page.context().close();
+}
+
+/** What a report says in a sentence and names without a detection. */
+async function useAnnotations(page) {
+  await page.evaluate(() => new Promise((done) => {
+    const request = indexedDB.open("starpipe");
+    request.onsuccess = () => {
+      const store = request.result.transaction("answers", "readwrite").objectStore("answers");
+      store.get(1).onsuccess = ({ target }) => {
+        const answer = target.result;
+        const named = { kind: "star", name: "A star", label: "A star", x: 200, y: 150, vmag: 1.2, id: null, detection: null, why: "saturated" };
+        answer.json = JSON.stringify({ ...JSON.parse(answer.json), sentence: "Orion, north is up." });
+        answer.data = JSON.stringify({ ...JSON.parse(answer.data), annotations: [named] });
+        store.put(answer, 1).onsuccess = () => { request.result.close(); done(); };
+      };
+    };
+  }));
+  await page.reload();
+  await page.waitForFunction(() => document.querySelector(".say")?.textContent === "Orion, north is up.", null, { timeout: 5000 });
+  const ring = await page.locator("#view circle.unmeasured").boundingBox();
+  await page.touchscreen.tap(ring.x + ring.width / 2, ring.y + ring.height / 2);
+  const said = await page.locator("#card").textContent();
+  check(said.includes("A star") && said.includes("V 1.20") && said.includes("Not measured: saturated"), `the card of a star that was not measured: ${said}`);
 }
 
 /** Thirty pictures: a cancel and a reload keep what was answered, and a button clears all. */

@@ -75,8 +75,15 @@ const tell = (text, isError = false) => {
   byId("state").className = isError ? "error" : "";
 };
 
+/** What is prepared, in words. */
+let preparing = "The program is being prepared.";
+
 /** How much of what is loaded is here. */
 const tellAmount = (stage, share) => {
+  const isProgram = stage === "program" && share < 1;
+  const now = isProgram ? "The program is being prepared." : "The catalog of stars is being prepared.";
+  if (byId("state").textContent === preparing && now !== preparing) tell(now);
+  preparing = now;
   const all = bytesOf(stage, [STARS, NUMBERS]) / 1e6;
   byId("amount").textContent = all && share < 1 ? `${(all * share).toFixed(1)} of ${all.toFixed(1)} MB` : "";
 };
@@ -254,7 +261,7 @@ const next = async () => {
   label(picture);
   byId("cancel").hidden = false;
   byId("work").setAttribute("aria-busy", "true");
-  tell(isReady ? `${picture.file.name} is being solved.` : "The catalog of stars is being prepared.");
+  tell(isReady ? `${picture.file.name} is being solved.` : preparing);
   keep(picture);
   try {
     await solve(picture);
