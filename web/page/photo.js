@@ -316,6 +316,8 @@ const showResult = async (picture, isNew = false) => {
   view.className = "frame";
   // Names are escaped where the elements are made.
   view.innerHTML = result.html;
+  // The page has its own headline, below the picture.
+  view.querySelector(".answer")?.remove();
   const told = view.querySelector("#told");
   const say = Object.assign(document.createElement("p"), { className: "say", textContent: sentence(report) });
   told?.append(say);

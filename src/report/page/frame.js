@@ -184,13 +184,14 @@ const showFrame = (root, data) => {
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
       if (taken.length >= MOST + skyNames.length) break;
       const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
-      const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
       // To the left of its star where it would leave the picture.
-      if (roomOf(...at, text)[2] > box.x + box.w) at[0] = star.x - (radius(star) + 4 + text.length * SIZE * 0.55) * u;
-      const room = roomOf(...at, text);
+      const off = (radius(star) + 4) * u, wide = text.length * SIZE * 0.6 * u;
+      const isLeft = star.x + off + 0.88 * wide > box.x + box.w;
+      const at = [star.x + (isLeft ? -off : off), star.y + SIZE * 0.35 * u];
+      const room = roomOf(at[0] - (isLeft ? wide : 0), at[1], text);
       if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
       taken.push(room);
-      make(layers.names, "text", { x: at[0], y: at[1], "font-size": SIZE * u, "stroke-width": 3 * u }, text);
+      make(layers.names, "text", { x: at[0], y: at[1], "text-anchor": isLeft ? "end" : "start", "font-size": SIZE * u, "stroke-width": 3 * u }, text);
     }
   };
   let frame = 0;
