@@ -52,7 +52,7 @@ async function useCard(page) {
   check(count <= 40, `${count} rings at first`);
   if (count === 0) return;
   await rings.first().click();
-  check(await card.isVisible() && (await card.locator("h3").textContent()) !== "", "a click on a star opens no card");
+  check(await card.isVisible() && (await card.locator("b").textContent()) !== "", "a click on a star opens no card");
   await page.locator("#view").focus();
   await page.keyboard.press("n");
   check(await card.isVisible(), "the key N tells of no star");

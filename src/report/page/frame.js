@@ -32,7 +32,7 @@ const makeCard = (card, view, onClose) => {
   const show = (chosen) => {
     star = chosen;
     card.replaceChildren();
-    add(card, "h3", titleOf(star));
+    add(card, "b", titleOf(star));
     const close = add(card, "button", "×");
     close.type = "button";
     close.setAttribute("aria-label", "Close");
