@@ -167,7 +167,6 @@ const restore = async () => {
     if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was given up: the page ended while it was solved.` });
     enqueue(kept);
   }
-  tellWhetherEmpty();
   if (pictures.length) choose(pictures.find(({ state }) => state === "done") ?? pictures[0]);
   next();
 };
@@ -398,7 +397,7 @@ const takeShared = async () => {
       const name = decodeURIComponent(new URL(request.url).pathname.replace(/^.*\//, ""));
       return response && new File([await response.blob()], name);
     }));
-    if (files.length) add(files.filter((file) => file !== undefined));
+    if (files.length) await add(files.filter((file) => file !== undefined));
   } catch { /* a browser without such storage has no such apps */ }
 };
 
@@ -437,7 +436,7 @@ export const photo = () => {
     next();
   });
   restored = restore();
-  restored.then(takeShared);
+  restored.then(takeShared).then(tellWhetherEmpty);
   engine.call("version").then((version) => { byId("version").textContent = version; }, (error) => tell(error.message, true));
   return engine.call("prepare").then(() => {
     isReady = wasReady = true;
