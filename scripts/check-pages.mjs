@@ -6,7 +6,7 @@
 import { readFileSync, statSync } from "node:fs";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
-import { SETTLE_MS, accessible, check, conclude, launch, option, showLayer, watch, words, zoom } from "./in-chromium.mjs";
+import { SETTLE_MS, accessible, check, conclude, launch, option, showLayer, unfold, watch, words, zoom } from "./in-chromium.mjs";
 
 // Of a page without its pictures.
 const MOST_KB = 1500;
@@ -44,7 +44,31 @@ async function useTables(page) {
   }
 }
 
+/** A click on a star opens its card there. */
+async function useCard(page) {
+  const card = page.locator("#card");
+  const rings = page.locator("#view circle.identified:visible");
+  const count = await rings.count();
+  check(count <= 40, `${count} rings at first`);
+  if (count === 0) return;
+  await rings.first().click();
+  check(await card.isVisible() && (await card.locator("b").textContent()) !== "", "a click on a star opens no card");
+  await page.locator("#view").focus();
+  await page.keyboard.press("n");
+  check(await card.isVisible(), "the key N tells of no star");
+  await page.keyboard.press("Escape");
+  check(!(await card.isVisible()), "Escape does not close the card");
+  const wipe = page.locator("#wipe");
+  if (!(await wipe.count())) return;
+  await wipe.fill("60");
+  check(await page.locator("#view .chart circle").first().isVisible(), "the slider shows no drawing");
+  await wipe.fill("0");
+  check(!(await page.locator("#view .chart circle").first().isVisible()), "the slider leaves the drawing");
+}
+
 async function useFrame(page, shot) {
+  await useCard(page);
+  await unfold(page);
   const box = () => page.locator("#view").getAttribute("viewBox");
   const whole = await box();
   await zoom(page, async () => {
@@ -58,8 +82,8 @@ async function useFrame(page, shot) {
     await sky.uncheck();
   }
   await page.locator("[data-layer=identified]").uncheck();
-  const hidden = await page.locator("#view g[style*='none'] circle").count();
-  check(hidden === (await page.locator("#view circle").count()), "a layer stays");
+  const hidden = await page.locator("#view g[style*='none'] circle.shape").count();
+  check(hidden === (await page.locator("#view circle.shape").count()), "a layer stays");
   await page.locator("[data-layer=identified]").check();
 
   const rows = page.locator("section.table tbody tr");
@@ -69,6 +93,16 @@ async function useFrame(page, shot) {
   // The view follows in the next picture of the browser, which may be late.
   for (let waited = 0; waited < SETTLE_MS && (await box()) === whole; waited += 50) await page.waitForTimeout(50);
   check((await box()) !== whole, "a row does not show its star");
+}
+
+/** On paper: dark on white, without what one presses. */
+async function printed(page, name) {
+  await page.emulateMedia({ media: "print" });
+  const back = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  check(back === "rgb(255, 255, 255)", `${name} is printed on ${back}`);
+  check((await page.locator("[data-zoom]:visible, #wipe:visible, input:visible").count()) === 0, `${name}: buttons are printed`);
+  const pdf = await page.pdf({ format: "A4", ...(shots ? { path: path.join(shots, `${name}.pdf`) } : {}) });
+  check(pdf.length > 1000, `${name} is not printed`);
 }
 
 const browser = await launch();
@@ -82,9 +116,14 @@ for (const file of words) {
     if (shots) await page.screenshot({ path: path.join(shots, `${name}-${colorScheme}.png`), fullPage: true });
     check((await page.locator("h1").count()) === 1, "one title");
     check(await page.locator("header .answer").isVisible(), "no answer");
+    // The picture is on the first screen.
+    const view = await page.locator("#view").boundingBox().catch(() => null);
+    check(!view || view.y < 300, `the picture begins at ${view?.y}`);
     if (await page.locator("#view").count()) await useFrame(page, shots && colorScheme === "dark" ? path.join(shots, `${name}-zoomed.png`) : null);
     await useTables(page);
+    await unfold(page);
     await accessible(page, name);
+    if (colorScheme === "dark") await printed(page, name);
     await page.close();
   }
   const html = readFileSync(file, "utf8");

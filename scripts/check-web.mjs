@@ -8,7 +8,7 @@ import { createServer } from "node:http";
 import os from "node:os";
 import path from "node:path";
 import { brotliCompressSync, gzipSync } from "node:zlib";
-import { SETTLE_MS, accessible, check, conclude, launch, option, showLayer, watch, words, zoom } from "./in-chromium.mjs";
+import { SETTLE_MS, accessible, check, conclude, launch, option, showLayer, unfold, watch, words, zoom } from "./in-chromium.mjs";
 
 const SOLVE_MS = 300_000;
 // What a visitor waits for before the page can be used, compressed with gzip.
@@ -30,6 +30,8 @@ for (const name of ["2019-07-29T204726_Alt40_Azi-135_Try1.tiff", "2019-07-29T204
 const frames = given.length ? given.map((name) => path.resolve(name)) : usual;
 
 const scratch = mkdtempSync(path.join(os.tmpdir(), "starpipe-web-"));
+/** Bytes per second that are sent; all at once without a limit. */
+let sentPerSecond = Infinity;
 /** The files that were sent, and their bodies. @type {Map<string, Buffer>} */
 const sent = new Map();
 /** What is sent of a file: with gzip, as most servers do, but for what is of unknown type. */
@@ -41,14 +43,29 @@ const packed = (name) => {
   return { body: sent.get(name), encoding: path.extname(name) in TYPES ? { "content-encoding": "gzip" } : {} };
 };
 
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".svg": "image/svg+xml" };
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm", ".svg": "image/svg+xml", ".webmanifest": "application/manifest+json" };
 const server = createServer((request, response) => {
   const name = decodeURIComponent(new URL(request.url, "http://localhost").pathname).replace(/\/$/, "/index.html");
   const file = path.join(dist, name);
   if (!file.startsWith(dist) || !existsSync(file)) return response.writeHead(404).end();
   const { body, encoding } = packed(path.relative(dist, file));
-  response.writeHead(200, { "content-type": TYPES[path.extname(file)] ?? "application/octet-stream", "cache-control": "max-age=600", ...encoding }).end(body);
+  response.writeHead(200, { "content-type": TYPES[path.extname(file)] ?? "application/octet-stream", "cache-control": "max-age=600", "content-length": body.length, ...encoding });
+  send(response, body);
 });
+/** When the line is free. */
+let freeAt = 0;
+/** Sends on one line, which all requests share. */
+const send = async (response, body) => {
+  const STEP = 8192;
+  if (sentPerSecond === Infinity) return response.end(body);
+  for (let at = 0; at < body.length && !response.destroyed; at += STEP) {
+    const part = body.subarray(at, at + STEP);
+    freeAt = Math.max(freeAt, Date.now()) + (1000 * part.length) / sentPerSecond;
+    await new Promise((done) => setTimeout(done, freeAt - Date.now()));
+    response.write(part);
+  }
+  response.end();
+};
 await new Promise((done) => server.listen(0, "127.0.0.1", done));
 const trusted = `http://localhost:${server.address().port}/`;
 // A place that browsers do not trust: without a service worker and without storage for files.
@@ -56,14 +73,23 @@ const UNTRUSTED = "starpipe.test";
 
 const browser = await launch(`--host-resolver-rules=MAP ${UNTRUSTED} 127.0.0.1`);
 
-const open = async (viewport, colorScheme, hash = "", address = trusted, prepare = async () => {}) => {
-  const context = await browser.newContext({ viewport, colorScheme, acceptDownloads: true });
+const open = async (viewport, colorScheme, hash = "", address = trusted, prepare = async () => {}, device = {}) => {
+  const context = await browser.newContext({ viewport, colorScheme, acceptDownloads: true, ...device });
   const page = await context.newPage();
   await prepare(page);
   watch(page, (url) => url.startsWith(address) || /^(data|blob):/.test(url));
   await page.addInitScript(() => {
     Object.assign(globalThis, { shift: 0, longTasks: [] });
-    new PerformanceObserver((list) => { for (const entry of list.getEntries()) if (!entry.hadRecentInput) globalThis.shift += entry.value; }).observe({ type: "layout-shift", buffered: true });
+    // The largest sum of 5 s without a pause of 1 s, as the measure of layout shift is defined.
+    let [sum, first, last] = [0, 0, -Infinity];
+    const add = ({ startTime, value, hadRecentInput }) => {
+      if (hadRecentInput) return;
+      if (startTime - last > 1000 || startTime - first > 5000) [sum, first] = [0, startTime];
+      last = startTime;
+      sum += value;
+      globalThis.shift = Math.max(globalThis.shift, sum);
+    };
+    new PerformanceObserver((list) => list.getEntries().forEach(add)).observe({ type: "layout-shift", buffered: true });
     new PerformanceObserver((list) => { for (const entry of list.getEntries()) globalThis.longTasks.push(entry.duration); }).observe({ type: "longtask", buffered: true });
   });
   await page.goto(address + hash);
@@ -87,8 +113,16 @@ const ready = async (page) => {
   await page.waitForFunction(() => !document.querySelector("#state").textContent.includes("prepared"), null, { timeout: SOLVE_MS });
   check((await state(page)).startsWith("Ready"), await state(page));
 };
+/** Gives files as a visitor does: what moves at once is no shift of the layout. */
+const give = async (page, files) => {
+  await page.mouse.click(2, 2);
+  await page.locator("#files").setInputFiles(files);
+};
+/** Whether the picture that is shown is identified. */
+const isIdentified = async (page) => (await page.locator("#answer .say").count()) === 1 && (await page.locator("#queue button[aria-pressed=true][aria-label$=', identified']").count()) === 1;
 const download = async (page, name) => {
-  const [file] = await Promise.all([page.waitForEvent("download", { timeout: SOLVE_MS }), page.getByRole("button", { name }).click()]);
+  await unfold(page);
+  const [file] = await Promise.all([page.waitForEvent("download", { timeout: SOLVE_MS }), page.getByRole("button", { name }).first().click()]);
   return readFileSync(await file.path());
 };
 
@@ -159,9 +193,9 @@ async function useWithoutRoom() {
     await session.send("Storage.overrideQuotaForOrigin", { origin: new URL(trusted).origin, quotaSize: 1000 });
   });
   await ready(page);
-  await page.locator("#files").setInputFiles(frames[0]);
+  await give(page, frames[0]);
   await settled(page);
-  check((await page.locator(".say").textContent()).includes("identified"), "no answer without room");
+  check(await isIdentified(page), "no answer without room");
   await page.waitForFunction(() => document.querySelector("#offline").textContent, null, { timeout: SOLVE_MS });
   const told = await page.locator("#offline").textContent();
   check(told.includes("does not keep"), `without room: ${told}`);
@@ -177,7 +211,7 @@ async function useUntrusted() {
     await page.waitForFunction(([selector, words]) => document.querySelector(selector)?.textContent.includes(words), what, { timeout: SOLVE_MS });
     return seconds(Date.now() - start);
   };
-  await page.locator("#files").setInputFiles(frames[0]);
+  await give(page, frames[0]);
   // While the index is built, which takes seconds. A cancel does not end that.
   const bright = await until(["#state", "bright stars"]);
   await shot(page, "progress-phone-dark");
@@ -186,7 +220,21 @@ async function useUntrusted() {
   check((await state(page)).includes("canceled"), `canceled while the index is built: ${await state(page)}`);
   await page.locator("#hints summary").click();
   await page.locator("#again").click();
-  console.log(`${path.basename(frames[0])} at the first visit: the bright stars answer after ${bright}, the whole catalog after ${await until([".say", "identified"])}`);
+  console.log(`${path.basename(frames[0])} at the first visit: the bright stars answer after ${bright}, the whole catalog after ${await until(["#state", "is solved"])}`);
+  await page.context().close();
+}
+
+/** On a line of 200 kB/s: what is loaded is counted, and the bright stars answer first. */
+async function useSlowly() {
+  sentPerSecond = 200_000;
+  const page = await openPhone("light");
+  const start = Date.now();
+  await give(page, frames[0]);
+  await page.waitForFunction(() => /^[1-9]\.\d of \d\.\d MB$/.test(document.querySelector("#amount").textContent), null, { timeout: SOLVE_MS });
+  await screenOf(page, "phone-slow");
+  await page.waitForFunction(() => document.querySelector("#state").textContent.includes("bright stars"), null, { timeout: SOLVE_MS });
+  console.log(`at 200 kB/s the first answer comes after ${seconds(Date.now() - start)}`);
+  sentPerSecond = Infinity;
   await page.context().close();
 }
 
@@ -203,9 +251,9 @@ const memoryMb = async () => {
 async function useEquipment() {
   const page = await open({ width: 1280, height: 900 }, "light");
   await ready(page);
-  await page.locator("#hints summary").click();
+  await unfold(page);
   const solve = async (frame, args) => {
-    await page.locator("#files").setInputFiles(path.join(scratch, frame));
+    await give(page, path.join(scratch, frame));
     await settled(page);
     const ours = JSON.parse((await download(page, "Report (JSON)")).toString());
     const theirs = JSON.parse(programJson(["process", "--threads", "1", "--format", "json", ...args, frame], scratch));
@@ -229,7 +277,7 @@ async function useEquipment() {
   for (const name of ["camera", "dark", "flat"]) await page.locator(`#${name}-file`).setInputFiles([]);
 
   writeFileSync(path.join(scratch, "two.fits"), twoImages(width, height));
-  await page.locator("#files").setInputFiles(path.join(scratch, "two.fits"));
+  await give(page, path.join(scratch, "two.fits"));
   await settled(page);
   await page.locator("#image").fill("2");
   await page.locator("#again").click();
@@ -262,7 +310,7 @@ async function usePhotographs() {
   await shot(page, "empty-desktop");
   for (const frame of frames) {
     const name = path.basename(frame);
-    await page.locator("#files").setInputFiles(frame);
+    await give(page, frame);
     await settled(page);
     const ours = JSON.parse((await download(page, "Report (JSON)")).toString());
     // A single thread, as the page has.
@@ -282,12 +330,13 @@ async function usePhotographs() {
 
 async function useFrame(page) {
   await page.locator("#queue button").first().click();
+  await unfold(page);
   await zoom(page);
   for (const layer of ["constellations", "equatorial"]) await showLayer(page, layer);
   await page.locator("section.table tbody tr").first().click();
   check((await page.locator("#under").textContent()).includes("SNR"), "a row tells nothing");
   await shot(page, "layers");
-  for (const [name, begins] of [["Annotated picture", "\x89PNG"], ["Page (HTML)", "<!doctype"], ["Stars (CSV)", "frame,"], ["Coordinates", "SIMPLE"]]) {
+  for (const [name, begins] of [["Save the picture", "\x89PNG"], ["Page (HTML)", "<!doctype"], ["Stars (CSV)", "frame,"], ["Coordinates", "SIMPLE"]]) {
     const bytes = await download(page, name);
     check(bytes.subarray(0, begins.length).toString("latin1") === begins, `${name} begins with ${bytes.subarray(0, 12).toString("latin1")}`);
   }
@@ -297,15 +346,16 @@ async function useOddly() {
   const page = await open({ width: 360, height: 740 }, "dark");
   const bad = path.join(scratch, "broken.fits");
   writeFileSync(bad, "SIMPLE  =                    T");
-  await page.locator("#files").setInputFiles(bad);
+  await give(page, bad);
   await settled(page);
   check(/truncated|header|END/i.test(await state(page)), `a broken file: ${await state(page)}`);
-  await page.locator("#files").setInputFiles(path.join(root, "Cargo.toml"));
+  await give(page, path.join(root, "Cargo.toml"));
   await settled(page);
   check((await state(page)).includes("Cargo.toml"), `no picture: ${await state(page)}`);
 
   // Cancel, then solve: by the keyboard alone.
-  await page.locator("#files").setInputFiles(frames[0]);
+  await give(page, frames[0]);
+  await page.locator("#cancel").waitFor();
   await page.locator("#cancel").focus();
   await page.keyboard.press("Enter");
   await settled(page);
@@ -317,7 +367,7 @@ async function useOddly() {
   await page.keyboard.press("Enter");
   await settled(page);
   console.log(`the answer after a cancelled search: ${seconds(Date.now() - start)}, with the index from storage`);
-  check((await page.locator(".say").textContent()).includes("identified"), "no answer after a cancel");
+  check(await isIdentified(page), "no answer after a cancel");
   check(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "the page is wider than 360 px");
   await shot(page, "phone-dark");
   await accessible(page, "phone, dark");
@@ -328,7 +378,7 @@ async function useOddly() {
   const dark = path.join(scratch, "dark.pgm");
   const noise = Buffer.from(Array.from({ length: 300 * 200 }, (_, i) => 20 + ((i * 7919) % 13)));
   writeFileSync(dark, Buffer.concat([Buffer.from("P5 300 200 255\n"), noise]));
-  await page.locator("#files").setInputFiles(dark);
+  await give(page, dark);
   await settled(page);
   await page.locator("#queue button").last().click();
   check((await page.locator(".say").textContent()).includes("not identified"), "a frame without stars is not said to be one");
@@ -482,6 +532,277 @@ async function useLinks(page) {
   }
 }
 
+/** Writes what a canvas makes of a picture as this type. */
+const converted = async (page, file, type, quality) => {
+  const base64 = await page.evaluate(async ([base64, type, quality]) => {
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))]));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    canvas.getContext("2d").drawImage(bitmap, 0, 0);
+    const bytes = new Uint8Array(await (await canvas.convertToBlob({ type, quality })).arrayBuffer());
+    return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
+  }, [readFileSync(file).toString("base64"), type, quality]);
+  return Buffer.from(base64, "base64");
+};
+
+/** Exif attributes with a date in UTC, a place, and a camera that was turned. */
+const exifBlock = () => {
+  const ascii = (text) => Buffer.from(`${text}\0`);
+  const rationals = (...values) => Buffer.concat(values.map((value) => { const pair = Buffer.alloc(8); pair.writeUInt32LE(value, 0); pair.writeUInt32LE(1, 4); return pair; }));
+  const short = (value) => { const bytes = Buffer.alloc(2); bytes.writeUInt16LE(value); return bytes; };
+  const long = (value) => { const bytes = Buffer.alloc(4); bytes.writeUInt32LE(value); return bytes; };
+  const SIZES = { 2: 1, 3: 2, 4: 4, 5: 8 };
+  /** A directory at this place, with its data behind it. */
+  const directory = (place, entries) => {
+    const head = Buffer.alloc(2 + 12 * entries.length + 4), data = [];
+    head.writeUInt16LE(entries.length);
+    let to = place + head.length;
+    entries.forEach(([tag, type, value], at) => {
+      const entry = 2 + 12 * at;
+      head.writeUInt16LE(tag, entry);
+      head.writeUInt16LE(type, entry + 2);
+      head.writeUInt32LE(value.length / SIZES[type], entry + 4);
+      if (value.length <= 4) return value.copy(head, entry + 8);
+      head.writeUInt32LE(to, entry + 8);
+      data.push(value);
+      to += value.length;
+    });
+    return Buffer.concat([head, ...data]);
+  };
+  const exif = directory(100, [[0x9003, 2, ascii("2026:01:15 22:30:00")], [0x9011, 2, ascii("+00:00")]]);
+  const gps = directory(200, [[1, 2, ascii("N")], [2, 5, rationals(52, 6, 0)], [3, 2, ascii("E")], [4, 5, rationals(5, 12, 0)]]);
+  const first = directory(8, [[0x0112, 3, short(6)], [0x8769, 4, long(100)], [0x8825, 4, long(200)]]);
+  const block = Buffer.alloc(200 + gps.length);
+  Buffer.from([0x49, 0x49, 42, 0, 8, 0, 0, 0]).copy(block);
+  for (const [part, at] of [[first, 8], [exif, 100], [gps, 200]]) part.copy(block, at);
+  return block;
+};
+
+/** A WebP file with Exif attributes. */
+const withExif = (webp, width, height) => {
+  const chunk = (name, data) => {
+    const head = Buffer.alloc(8);
+    head.write(name);
+    head.writeUInt32LE(data.length, 4);
+    return Buffer.concat([head, data, Buffer.alloc(data.length % 2)]);
+  };
+  const isExtended = webp.toString("latin1", 12, 16) === "VP8X";
+  const extended = isExtended ? Buffer.from(webp.subarray(20, 30)) : Buffer.alloc(10);
+  extended[0] |= 0x08;
+  extended.writeUIntLE(width - 1, 4, 3);
+  extended.writeUIntLE(height - 1, 7, 3);
+  const body = Buffer.concat([Buffer.from("WEBP"), chunk("VP8X", extended), webp.subarray(isExtended ? 30 : 12), chunk("EXIF", exifBlock())]);
+  const head = Buffer.alloc(8);
+  head.write("RIFF");
+  head.writeUInt32LE(body.length, 4);
+  return Buffer.concat([head, body]);
+};
+
+/** The boxes of a HEIC file that lead to its Exif attributes. */
+const heicExif = () => {
+  const box = (name, ...parts) => {
+    const content = Buffer.concat(parts), head = Buffer.alloc(8);
+    head.writeUInt32BE(content.length + 8);
+    head.write(name, 4);
+    return Buffer.concat([head, content]);
+  };
+  const bytes = (...values) => Buffer.from(values);
+  const exif = Buffer.concat([bytes(0, 0, 0, 6), Buffer.from("Exif\0\0"), exifBlock()]);
+  const made = (offset) => {
+    const place = Buffer.alloc(8);
+    place.writeUInt32BE(offset);
+    place.writeUInt32BE(exif.length, 4);
+    const iinf = box("iinf", bytes(0, 0, 0, 0, 0, 1), box("infe", bytes(2, 0, 0, 0, 0, 1, 0, 0), Buffer.from("Exif\0")));
+    const iloc = box("iloc", bytes(1, 0, 0, 0, 0x44, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 1), place);
+    return Buffer.concat([box("ftyp", Buffer.from("heic\0\0\0\0")), box("meta", bytes(0, 0, 0, 0), iinf, iloc)]);
+  };
+  return Buffer.concat([made(made(0).length), exif]);
+};
+
+const report = async (page) => JSON.parse((await download(page, "Report (JSON)")).toString());
+
+/** Formats that the browser decodes, and a file that is cut off. */
+async function useFormats() {
+  const page = await open({ width: 800, height: 700 }, "light");
+  await ready(page);
+  const png = path.join(root, "fixtures/orion/orion.png");
+  const [width, height] = [readFileSync(png).readUInt32BE(16), readFileSync(png).readUInt32BE(20)];
+  const solve = async (name, buffer) => {
+    await give(page, { name, mimeType: "", buffer });
+    await settled(page);
+    check(await isIdentified(page), `${name}: ${await state(page)}`);
+    return report(page);
+  };
+  const plain = await solve("orion.png", readFileSync(png));
+  const webp = await solve("orion.webp", withExif(await converted(page, png, "image/webp", 1), width, height));
+  check(webp.date?.iso === "2026-01-15T22:30:00Z", `WebP: date ${webp.date?.iso}`);
+  check(Boolean(webp.observation), "WebP: the place is not used");
+  check(Math.abs(webp.match.matched - plain.match.matched) <= 0.1 * plain.match.matched, `WebP: ${webp.match.matched} stars, PNG: ${plain.match.matched}`);
+
+  const jpeg = await converted(page, png, "image/jpeg", 0.95);
+  const cut = await solve("cut.jpg", jpeg.subarray(0, Math.round(jpeg.length * 0.8)));
+  const said = await page.locator("#told .notes").textContent();
+  check(cut.height < height && cut.height > height / 2 && said.includes(`first ${cut.height} of ${height} rows`), `cut off: ${cut.height} rows, ${said}`);
+  console.log(`WebP: ${webp.match.matched} stars, PNG: ${plain.match.matched}; the first ${cut.height} of ${height} rows of a JPEG: ${cut.match.matched}`);
+
+  const exif = await page.evaluate(async (bytes) => {
+    // @ts-ignore
+    const { exifOf, formatOf } = await import("./exif.js");
+    const file = Uint8Array.from(bytes), format = formatOf(file);
+    return { format, exif: [...exifOf(file, format) ?? []] };
+  }, [...heicExif()]);
+  const upright = exifBlock();
+  upright[8 + 2 + 8] = 1;
+  check(exif.format === "HEIC" && Buffer.from(exif.exif).equals(upright), `the attributes of HEIC: ${exif.exif.length} bytes`);
+  await give(page, { name: "a.heic", mimeType: "", buffer: heicExif() });
+  await settled(page);
+  check((await state(page)).includes("does not open HEIC"), `HEIC: ${await state(page)}`);
+  await page.context().close();
+}
+
+const PHONE = { width: 390, height: 844 };
+const openPhone = (colorScheme, prepare) => open(PHONE, colorScheme, "", trusted, prepare, { hasTouch: true, isMobile: true, deviceScaleFactor: 2, permissions: ["clipboard-read", "clipboard-write"] });
+/** Without the whole page, as a phone shows it. */
+const screenOf = async (page, name) => { if (shots) await page.screenshot({ path: path.join(shots, `${name}.png`) }); };
+const boxOf = async (page, selector) => (await page.locator(selector).boundingBox()) ?? { x: NaN, y: NaN, width: NaN, height: NaN };
+
+/** Five stars by touch: each has its card there, and nothing scrolls. */
+async function tapStars(page) {
+  const rings = page.locator("#view circle.identified:visible");
+  check((await rings.count()) >= 5 && (await rings.count()) <= 40, `${await rings.count()} rings at first`);
+  const scrolled = await page.evaluate(() => scrollY);
+  const titles = new Set();
+  for (let at = 0; at < 5; at += 1) {
+    const ring = await rings.nth(at).boundingBox();
+    await page.touchscreen.tap(ring.x + ring.width / 2, ring.y + ring.height / 2);
+    const card = await boxOf(page, "#card");
+    titles.add(await page.locator("#card b").textContent());
+    const isNear = Math.abs(card.y - ring.y) < 400 && card.x >= 0 && card.x + card.width <= PHONE.width && card.y >= 0 && card.y < PHONE.height;
+    check(isNear, `star ${at}: the card is at ${JSON.stringify(card)}, its star at ${JSON.stringify(ring)}`);
+    if (at === 0) await screenOf(page, "phone-card");
+    await page.getByRole("button", { name: "Close" }).tap();
+    check(!(await page.locator("#card").isVisible()), "the card stays");
+  }
+  check(titles.size === 5, `cards of ${[...titles].join(", ")}`);
+  check(await page.evaluate(() => scrollY) === scrolled, "a tap scrolls the page");
+}
+
+/** A phone: an example, its picture first, cards, buttons, and what a reload keeps. */
+async function usePhone() {
+  const page = await openPhone("dark", (page) => page.addInitScript(() => {
+    Object.assign(navigator, { canShare: () => true, share: async (data) => { Object.assign(globalThis, { shared: data }); } });
+  }));
+  await ready(page);
+  await screenOf(page, "phone-empty");
+  for (const name of ["Orion", "Cygnus", "Big Dipper"]) {
+    await page.evaluate(() => document.documentElement.classList.remove("has-pictures"));
+    await page.getByRole("button", { name, exact: true }).tap();
+    await page.waitForFunction(() => !document.querySelector("#work[aria-busy]") && document.querySelector(".queue button:last-child"), null, { timeout: SOLVE_MS });
+    await page.waitForFunction((name) => document.querySelector("#queue button[aria-pressed=true]")?.textContent.includes(name), name.toLowerCase().split(" ").at(-1), { timeout: SOLVE_MS });
+    await settled(page);
+    await page.waitForTimeout(3 * SETTLE_MS);
+    check(await isIdentified(page), `the example ${name}: ${await state(page)}`);
+    await screenOf(page, `phone-${name}`);
+  }
+  const view = await boxOf(page, "#view");
+  check(view.y > -2 && view.y < 60 && view.width === PHONE.width, `the picture is at ${JSON.stringify(view)}`);
+  check(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "the page is wider than the phone");
+  await tapStars(page);
+  await page.locator("#wipe").fill("50");
+  check(await page.locator("#view .chart circle").first().isVisible(), "the slider shows no drawing");
+  await screenOf(page, "phone-drawing");
+  await page.locator("#wipe").fill("0");
+  await page.getByRole("button", { name: "Share", exact: true }).tap();
+  await page.waitForFunction(() => "shared" in globalThis, null, { timeout: SOLVE_MS });
+  // @ts-ignore
+  const shared = await page.evaluate(() => ({ type: globalThis.shared.files[0].type, size: globalThis.shared.files[0].size, text: globalThis.shared.text }));
+  check(shared.type === "image/png" && shared.size > 10_000 && shared.text === await page.locator(".say").textContent(), `shared: ${JSON.stringify(shared)}`);
+  await page.getByRole("button", { name: /Copy link/ }).tap();
+  await page.waitForFunction(async () => (await navigator.clipboard.readText()).includes("#limit?"), null, { timeout: SOLVE_MS });
+  check((await page.evaluate(() => navigator.clipboard.readText())).includes("focal_length_mm="), "the link has no focal length");
+  await accessible(page, "phone");
+  await unfold(page);
+  await accessible(page, "phone, unfolded");
+  await shot(page, "phone-unfolded");
+
+  const said = await page.locator(".say").textContent();
+  await page.reload();
+  await page.waitForSelector("#answer .say", { timeout: 5000 });
+  check((await page.locator("#queue button[aria-label$=', identified']").count()) === 3, "a reload loses answers");
+  await page.locator("#queue button").last().tap();
+  await page.waitForFunction((said) => document.querySelector(".say")?.textContent === said, said, { timeout: 5000 });
+  await useAnnotations(page);
+  await useQueue(page);
+  await useShareTarget(page);
+  const layoutShift = await page.evaluate(() => globalThis.shift);
+  console.log(`on a phone: layout shift ${layoutShift.toFixed(3)}`);
+  check(layoutShift < 0.1, `the layout shifts by ${layoutShift.toFixed(3)} on a phone`);
+  await page.context().close();
+}
+
+/** What a report says in a sentence and names without a detection. */
+async function useAnnotations(page) {
+  await page.evaluate(() => new Promise((done) => {
+    const request = indexedDB.open("starpipe");
+    request.onsuccess = () => {
+      const store = request.result.transaction("answers", "readwrite").objectStore("answers");
+      store.get(1).onsuccess = ({ target }) => {
+        const answer = target.result;
+        const named = { kind: "star", name: "A star", label: "A star", x: 200, y: 150, vmag: 1.2, id: null, detection: null, why: "saturated" };
+        answer.json = JSON.stringify({ ...JSON.parse(answer.json), sentence: "Orion, north is up." });
+        answer.data = JSON.stringify({ ...JSON.parse(answer.data), annotations: [named] });
+        store.put(answer, 1).onsuccess = () => { request.result.close(); done(); };
+      };
+    };
+  }));
+  await page.reload();
+  await page.waitForFunction(() => document.querySelector(".say")?.textContent === "Orion, north is up.", null, { timeout: 5000 });
+  const ring = await page.locator("#view circle.unmeasured").boundingBox();
+  await page.touchscreen.tap(ring.x + ring.width / 2, ring.y + ring.height / 2);
+  const said = await page.locator("#card").textContent();
+  check(said.includes("A star") && said.includes("V 1.20") && said.includes("Not measured: saturated"), `the card of a star that was not measured: ${said}`);
+}
+
+/** Thirty pictures: a cancel and a reload keep what was answered, and a button clears all. */
+async function useQueue(page) {
+  const [before, count, buffer] = [await page.locator("#queue button").count(), 30, readFileSync(path.join(root, "fixtures/orion/orion.png"))];
+  await give(page, Array.from({ length: count }, (_, at) => ({ name: `many-${at}.png`, mimeType: "image/png", buffer })));
+  const solved = (least) => page.waitForFunction((least) => document.querySelectorAll("#queue button[aria-label$=', identified']").length >= least, least, { timeout: SOLVE_MS });
+  await solved(before + 3);
+  await page.locator("#cancel").tap();
+  await solved(before + 6);
+  const already = await page.locator("#queue button[aria-label$=', identified']").count();
+  await page.reload();
+  await page.waitForFunction((already) => document.querySelectorAll("#queue button[aria-label$=', identified']").length >= already, already, { timeout: 10_000 });
+  check(await page.locator("#queue button").count() === before + count, "a reload loses pictures");
+  await settled(page);
+  const [all, canceled] = [await page.locator("#queue button[aria-label$=', identified']").count(), await page.locator("#queue button[aria-label$='could not be solved']").count()];
+  check(all + canceled === before + count && canceled <= 1, `of ${before + count} pictures ${all} are identified, ${canceled} canceled`);
+  check((await page.locator("#queue-count").textContent()).includes(`${all} of ${before + count}`), await page.locator("#queue-count").textContent());
+  await screenOf(page, "phone-queue");
+  page.once("dialog", (dialog) => dialog.accept());
+  await page.locator("#clear").tap();
+  await page.waitForFunction(() => !document.querySelector("#queue button"));
+  await page.reload();
+  await ready(page);
+  check(await page.locator("#queue button").count() === 0, "what was cleared comes back");
+  console.log(`a queue of ${count}: ${all - before} answers after a cancel and a reload`);
+}
+
+/** What another app shares: the service worker takes it, the page solves it. */
+async function useShareTarget(page) {
+  const manifest = await page.evaluate(async () => (await fetch(/** @type {HTMLLinkElement} */ (document.querySelector("link[rel=manifest]")).href)).json());
+  for (const { src } of manifest.icons) check(existsSync(path.join(dist, src)), `no icon ${src}`);
+  await page.waitForFunction(() => navigator.serviceWorker.controller, null, { timeout: SOLVE_MS });
+  await page.evaluate(async ([action, base64]) => {
+    const form = new FormData();
+    form.append("pictures", new File([Uint8Array.from(atob(base64), (byte) => byte.charCodeAt(0))], "a shared picture.png", { type: "image/png" }));
+    await fetch(action, { method: "POST", body: form, redirect: "manual" });
+  }, [manifest.share_target.action, readFileSync(path.join(root, "fixtures/orion/orion.png")).toString("base64")]);
+  await page.goto(`${trusted}?shared`);
+  await page.waitForSelector("#queue button[aria-label='a shared picture.png, identified']", { timeout: SOLVE_MS });
+  await page.waitForSelector("#answer .say", { timeout: SOLVE_MS });
+}
+
 async function useModels() {
   const page = await open({ width: 1280, height: 900 }, "light", "#limit?preset=imx174-35mm&exposure_s=0.5&sky_mag_arcsec2=20");
   await page.waitForFunction(() => document.querySelector("#limit-json").textContent.includes("mean_vmag"), null, { timeout: SOLVE_MS });
@@ -525,14 +846,14 @@ async function useOffline() {
   await page.context().setOffline(true);
   await page.reload();
   await ready(page);
-  await page.locator("#files").setInputFiles(frames[0]);
+  await give(page, frames[0]);
   await settled(page);
-  check((await page.locator(".say").textContent()).includes("identified"), "no answer without a network");
+  check(await isIdentified(page), "no answer without a network");
   await page.context().close();
 }
 
 try {
-  for (const use of [useTwice, usePhotographs, useEquipment, useOddly, useModels, useOffline, useWithoutRoom, useUntrusted]) await use();
+  for (const use of [useTwice, usePhotographs, usePhone, useFormats, useEquipment, useOddly, useModels, useOffline, useWithoutRoom, useUntrusted, useSlowly]) await use();
 } catch (error) {
   check(false, error.stack);
 }

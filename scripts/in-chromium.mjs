@@ -68,6 +68,9 @@ export const zoom = async (page, whileZoomed = async () => {}) => {
   check((await box()) === whole, "the key 0 does not show the whole frame");
 };
 
+/** Opens all that is folded. */
+export const unfold = (page) => page.evaluate(() => { for (const fold of document.querySelectorAll("details")) fold.open = true; });
+
 /** A layer of the sky is hidden until it is wanted. */
 export const showLayer = async (page, layer) => {
   const lines = page.locator(`#view .${layer} path`).first();

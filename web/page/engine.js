@@ -1,3 +1,5 @@
+import { program } from "./program.js";
+
 /** What a call ends with that was stopped. */
 export class Stopped extends Error {}
 
@@ -54,6 +56,7 @@ export class Engine {
       else waiting?.reject(new Error(data.error));
       if (data.isFatal) this.#end(new Error(data.error));
     });
+    program(this.#onProgress).then((module) => worker.postMessage({ module }), (error) => { if (worker === this.#worker) this.#end(error); });
     worker.addEventListener("error", (event) => this.#end(new Error(event.message || "the thread could not be started")));
     return worker;
   }

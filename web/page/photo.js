@@ -1,37 +1,38 @@
-// The tab of photographs: pictures wait in a queue, one is solved at a time, one is shown.
+// The tab of photographs: pictures wait in a queue, one is solved at a time, one is shown. All are kept.
+import { actions, cameraLink, canShare, copyLink, direction, remedies, save, sentence } from "./answer.js";
 import { byId } from "./dom.js";
 import { Engine, Stopped } from "./engine.js";
+import { BUILD, NUMBERS, STARS } from "./files.js";
+import { bytesOf } from "./program.js";
+import { clearAll, keepAnswer, keepPicture, keptAnswer, keptPictures } from "./store.js";
 import { showFrame } from "./views.js";
 
 /** Stages as people are told of them, in their order. */
 const STAGES = [
-  ["catalog", "Load the catalog"], ["index", "Index it"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
+  ["program", "Load the program"], ["catalog", "Load the catalog"], ["index", "Index it"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
   ["naming", "Name the stars"], ["photometry", "Measure brightness"],
 ];
-/** What a remedy of the report leads to: the field of the form, and the words of its button. */
-const REMEDIES = {
-  fov: ["fov", "State the width of the field"],
-  pixel_scale: ["pixel_scale", "State the angle of a pixel"],
-  near: ["near", "State where it points"],
-  radius: ["radius", "State how far from there"],
-  date: ["date", "State the date"],
-  sigma: ["sigma", "Change the detection threshold"],
-  time_limit: ["thorough", "Search longer"],
-};
 /** Files that browsers show themselves. */
-const SHOWN_BY_BROWSER = /\.(jpe?g|png|bmp)$/i;
+const SHOWN_BY_BROWSER = /\.(jpe?g|png|bmp|webp|avif|hei[cf])$/i;
+/** Where the service worker leaves what other apps share. */
+const SHARED_CACHE = "shared-with-starpipe";
+/** A picture that ended the page this often is left alone. */
+const MOST_TRIES = 2;
 /** Files that may have several images. */
 const HAS_IMAGES = /\.(tiff?|fits?|fts|fz|gz)$/i;
 
 /**
+ * @typedef {{ json: string, html: string, data: string, said: string }} Answer
  * @typedef {object} Picture
  * @property {File} file
- * @property {number} number
+ * @property {number} id
  * @property {"waits" | "runs" | "done" | "failed"} state
+ * @property {string} status
+ * @property {number} tries
  * @property {string} options
  * @property {Record<string, File>} equipment
  * @property {number} images
- * @property {{ json: string, html: string, data: string } | null} result
+ * @property {Answer | null} result What is in storage is not in memory, too.
  * @property {string} error
  * @property {HTMLButtonElement} button
  */
@@ -74,7 +75,21 @@ const tell = (text, isError = false) => {
   byId("state").className = isError ? "error" : "";
 };
 
+/** What is prepared, in words. */
+let preparing = "The program is being prepared.";
+
+/** How much of what is loaded is here. */
+const tellAmount = (stage, share) => {
+  const isProgram = stage === "program" && share < 1;
+  const now = isProgram ? "The program is being prepared." : "The catalog of stars is being prepared.";
+  if (byId("state").textContent === preparing && now !== preparing) tell(now);
+  preparing = now;
+  const all = bytesOf(stage, [STARS, NUMBERS]) / 1e6;
+  byId("amount").textContent = all && share < 1 ? `${(all * share).toFixed(1)} of ${all.toFixed(1)} MB` : "";
+};
+
 const tellStage = (stage, share) => {
+  tellAmount(stage, share);
   const at = STAGES.findIndex(([name]) => name === stage);
   if (at < 0) return;
   const isDone = share >= 1;
@@ -84,50 +99,109 @@ const tellStage = (stage, share) => {
   byId("done").value = (at + share) / STAGES.length;
 };
 
-const key = ({ number, options, equipment }) => {
+const key = ({ id, options, equipment }) => {
   const files = Object.entries(equipment).map(([name, file]) => [name, file.name, file.size, file.lastModified]);
-  return JSON.stringify([number, options, files]);
+  return JSON.stringify([id, options, files]);
 };
 
 const markOf = { waits: "…", runs: "◌", done: "●", failed: "!" };
 const label = (picture) => {
-  const report = picture.result && JSON.parse(picture.result.json);
-  const state = { waits: "waits", runs: "is being solved", failed: "could not be solved", done: report?.status === "identified" ? "identified" : "not identified" }[picture.state];
-  const mark = report && report.status !== "identified" ? "○" : markOf[picture.state];
+  const isIdentified = picture.status === "identified";
+  const state = { waits: "waits", runs: "is being solved", failed: "could not be solved", done: isIdentified ? "identified" : "not identified" }[picture.state];
+  const mark = picture.state === "done" && !isIdentified ? "○" : markOf[picture.state];
   picture.button.replaceChildren(Object.assign(document.createElement("span"), { className: "mark", textContent: mark, ariaHidden: "true" }), picture.file.name);
   picture.button.setAttribute("aria-label", `${picture.file.name}, ${state}`);
   picture.button.setAttribute("aria-pressed", String(picture === chosen));
+  const waiting = pictures.filter(({ state }) => state === "waits").length;
+  byId("queue-count").textContent = pictures.length > 1 ? `${pictures.filter(({ state }) => state === "done").length} of ${pictures.length} are solved.` : "";
+  byId("cancel-all").hidden = !running || !waiting;
+  tellWhetherEmpty();
+};
+
+/** The next visit leaves room for what is kept, see early.js. */
+const tellWhetherEmpty = () => {
+  const has = pictures.length > 0;
+  document.documentElement.classList.toggle("has-pictures", has);
+  try {
+    localStorage.setItem("has-pictures", has ? "1" : "");
+  } catch { /* it jumps a little */ }
+};
+
+const keep = ({ file, id, state, status, tries, options, equipment, images, error }) => keepPicture({ file, id, state, status, tries, options, equipment, images, error, build: BUILD });
+
+/** @param {Partial<Picture> & { file: File }} given @returns {Picture} */
+const enqueue = (given) => {
+  const button = document.createElement("button");
+  button.type = "button";
+  const id = pictures.reduce((most, { id }) => Math.max(most, id), 0) + 1;
+  /** @type {Picture} */
+  const picture = { id, state: "waits", status: "", tries: 0, options: stated(true), equipment: equipment(), images: 1, result: null, error: "", button, ...given };
+  button.addEventListener("click", () => choose(picture));
+  const item = document.createElement("li");
+  item.appendChild(button);
+  byId("queue").appendChild(item);
+  pictures.push(picture);
+  label(picture);
+  return picture;
 };
 
 /** @param {Iterable<File>} files */
-const add = (files) => {
-  for (const file of files) {
-    const button = document.createElement("button");
-    button.type = "button";
-    /** @type {Picture} */
-    const picture = { file, number: pictures.length, state: "waits", options: stated(true), equipment: equipment(), images: 1, result: null, error: "", button };
-    button.addEventListener("click", () => choose(picture));
-    const item = document.createElement("li");
-    item.appendChild(button);
-    byId("queue").appendChild(item);
-    pictures.push(picture);
-    label(picture);
+const add = async (files) => {
+  await restored;
+  const isIdle = !running;
+  const added = [...files].map((file) => enqueue({ file }));
+  for (const picture of added) {
+    keep(picture);
     countImages(picture);
-    if (!running && pictures.every((one) => one === picture || one.state !== "waits")) choose(picture);
   }
+  if (added.length && isIdle) choose(added[0], true);
   next();
 };
 
-const choose = (picture) => {
+/** What an earlier visit left. */
+const restore = async () => {
+  for (const { build, ...kept } of await keptPictures()) {
+    const wasSolving = kept.state === "runs";
+    // Answers of another version do not fit this one.
+    if (wasSolving || (kept.state === "done" && build !== BUILD)) kept.state = "waits";
+    if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was given up: the page ended while it was solved.` });
+    enqueue(kept);
+  }
+  if (pictures.length) choose(pictures.find(({ state }) => state === "done") ?? pictures[0]);
+  next();
+};
+
+const clear = async () => {
+  if (!confirm("Remove all pictures and answers from this page?")) return;
+  for (const picture of pictures.splice(0)) picture.state = "failed";
+  stop();
+  [chosen, byId("again").disabled] = [null, true];
+  byId("queue").replaceChildren();
+  byId("answer").replaceChildren();
+  byId("preview").hidden = true;
+  tellWhetherEmpty();
+  await clearAll();
+  tell("Ready for your picture.");
+};
+
+/** @param {Picture} picture @param {boolean} [isNew] */
+const choose = async (picture, isNew = false) => {
   chosen = picture;
   pictures.forEach(label);
   byId("again").disabled = false;
   byId("answer").replaceChildren();
   byId("preview").hidden = true;
   showImages(picture);
-  if (picture.result) showResult(picture);
+  if (picture.state === "done") await showResult(picture);
   else showPreview(picture);
   if (picture.state === "failed") tell(picture.error, true);
+  if (isNew) bringToTop("work");
+};
+
+/** @param {string} id */
+const bringToTop = (id) => {
+  const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  byId(id)?.scrollIntoView({ block: "start", behavior: isStill ? "auto" : "smooth" });
 };
 
 /** The choice of an image, in files with several. */
@@ -149,16 +223,31 @@ const countImages = async (picture) => {
 
 const showPreview = async (picture) => {
   const image = byId("preview").querySelector("img");
-  const show = (blob) => {
-    if (chosen !== picture || picture.result) return;
+  const show = async (blob) => {
     URL.revokeObjectURL(image.src);
     image.src = URL.createObjectURL(blob);
-    byId("preview").hidden = false;
+    // Its size is known before its place is taken.
+    const isShown = await image.decode().then(() => true, () => false);
+    if (chosen === picture && picture.state !== "done") byId("preview").hidden = !isShown;
   };
   if (SHOWN_BY_BROWSER.test(picture.file.name)) return show(picture.file);
   try {
     show(new Blob([await scout.call("preview", picture.file, JSON.parse(picture.options).image)], { type: "image/jpeg" }));
   } catch { /* the solution tells why */ }
+};
+
+/** @param {Picture} picture */
+const solve = async (picture) => {
+  if (!wasReady) glance(picture);
+  const givenUp = new Promise((_, reject) => { giveUp = () => reject(new Stopped("stopped")); });
+  await Promise.race([engine.call("prepare"), givenUp]);
+  isReady = wasReady = true;
+  tell(`${picture.file.name} is being solved.`);
+  const answer = await engine.call("solve", key(picture), picture.file, picture.options, picture.equipment);
+  Object.assign(picture, { state: "done", status: JSON.parse(answer.json).status, tries: 0, result: answer });
+  const isKept = await keepAnswer(picture.id, answer);
+  // Without storage, memory has to do.
+  if (isKept && picture !== chosen) picture.result = null;
 };
 
 const next = async () => {
@@ -167,31 +256,37 @@ const next = async () => {
   if (!picture) return;
   running = picture;
   picture.state = "runs";
+  picture.tries += 1;
   label(picture);
   byId("cancel").hidden = false;
   byId("work").setAttribute("aria-busy", "true");
-  tell(isReady ? `${picture.file.name} is being solved.` : "The catalog of stars is being prepared.");
+  tell(isReady ? `${picture.file.name} is being solved.` : preparing);
+  keep(picture);
   try {
-    if (!wasReady) glance(picture);
-    const givenUp = new Promise((_, reject) => { giveUp = () => reject(new Stopped("stopped")); });
-    await Promise.race([engine.call("prepare"), givenUp]);
-    isReady = wasReady = true;
-    tell(`${picture.file.name} is being solved.`);
-    picture.result = await engine.call("solve", key(picture), picture.file, picture.options, picture.equipment);
-    picture.state = "done";
+    await solve(picture);
     tell(`${picture.file.name} is done.`);
   } catch (error) {
     picture.state = "failed";
     picture.error = error instanceof Stopped ? `${picture.file.name} was canceled.` : error.message;
     isReady = !(error instanceof Stopped) && isReady;
-    tell(picture.error, true);
+    if (pictures.includes(picture)) tell(picture.error, true);
   }
   running = null;
   byId("cancel").hidden = true;
   byId("work").removeAttribute("aria-busy");
-  label(picture);
-  if (picture === chosen && picture.result) showResult(picture);
+  if (pictures.includes(picture)) {
+    label(picture);
+    keep(picture);
+    if (picture === chosen && picture.result) await showResult(picture, true);
+  }
   next();
+};
+
+/** Ends what runs. */
+const stop = () => {
+  if (isReady) engine.stop();
+  else giveUp();
+  scout.stop();
 };
 
 /** What the bright stars alone say, until the catalog is here. */
@@ -203,64 +298,37 @@ const glance = async (picture) => {
   } catch { /* the full search tells why */ }
 };
 
-/** The field's centre in words. */
-const direction = ({ ra_deg, dec_deg }) => {
-  const minutes = Math.round(ra_deg * 4) % 1440;
-  return `right ascension ${Math.floor(minutes / 60)}\u00a0h ${minutes % 60}\u00a0min, declination ${dec_deg.toFixed(1).replace("-", "−")}°`;
-};
+/** @param {Picture} picture @returns {Promise<Answer | null>} */
+const answerOf = async (picture) => picture.result ?? (await keptAnswer(picture.id)) ?? null;
 
-/** The answer in a sentence. */
-const sentence = (report) => {
-  if (report.status !== "identified") return `The stars of ${report.frame} are not identified${report.reason ? `: ${report.reason}` : ""}.`;
-  const { attitude, optics, match } = report;
-  const named = report.stars.filter((star) => star.name).sort((a, b) => a.vmag - b.vmag)[0];
-  const field = optics.fov_x_deg && optics.fov_y_deg ? `${optics.fov_x_deg.toFixed(2)}° × ${optics.fov_y_deg.toFixed(2)}°` : "a wide part";
-  const brightest = named ? ` The brightest star with a name is ${named.name} (V\u00a0${named.vmag.toFixed(2)}).` : "";
-  return `${report.frame} shows ${field} of the sky around ${direction(attitude)}: ${match.matched} stars are identified, the faintest of V\u00a0${report.magnitude.faintest_vmag.toFixed(1)}.${brightest}`;
-};
-
-const showResult = (picture) => {
-  const report = JSON.parse(picture.result.json);
-  byId("preview").hidden = true;
-  const answer = byId("answer");
-  answer.replaceChildren();
-  const say = document.createElement("p");
-  say.className = "say";
-  say.textContent = sentence(report);
-  answer.append(say, report.status === "identified" ? downloads(picture, report) : remedies(picture, report));
+/** @param {Picture} picture @param {boolean} [isNew] */
+const showResult = async (picture, isNew = false) => {
+  const result = await answerOf(picture);
+  if (picture !== chosen) return;
+  if (!result) {
+    // The browser took its storage back.
+    picture.state = "waits";
+    return next();
+  }
+  const report = JSON.parse(result.json);
   const view = document.createElement("div");
   view.className = "frame";
   // Names are escaped where the elements are made.
-  view.innerHTML = picture.result.html;
-  // The sentence has the reason already.
-  if (report.status !== "identified") view.querySelector(".answer")?.remove();
-  answer.append(view);
-  showFrame(view, JSON.parse(picture.result.data));
+  view.innerHTML = result.html;
+  // The page has its own headline, below the picture.
+  view.querySelector(".answer")?.remove();
+  const told = view.querySelector("#told");
+  const say = Object.assign(document.createElement("p"), { className: "say", textContent: sentence(report) });
+  told?.append(say);
+  if (result.said) told?.append(Object.assign(document.createElement("p"), { className: "notes", textContent: result.said }));
+  if (report.status !== "identified") told?.append(remedies(report.remedies));
+  told?.append(...buttons(picture, report, result));
+  byId("preview").hidden = true;
+  byId("answer").replaceChildren(view);
+  showFrame(view, JSON.parse(result.data));
   const took = `${(report.timing_ms.total / 1000).toFixed(2)} s`;
-  tell(report.status === "identified" ? `${picture.file.name} is solved, in ${took}.` : `${picture.file.name} has no answer, after ${took}.`);
-};
-
-const actions = (name, items) => {
-  const group = document.createElement("div");
-  group.className = "downloads";
-  group.setAttribute("role", "group");
-  group.setAttribute("aria-label", name);
-  for (const [text, act] of items) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = text;
-    button.addEventListener("click", act);
-    group.appendChild(button);
-  }
-  return group;
-};
-
-const save = (blob, name) => {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  if (!running) tell(report.status === "identified" ? `${picture.file.name} is solved, in ${took}.` : `${picture.file.name} has no answer, after ${took}.`);
+  if (isNew) bringToTop("answer");
 };
 
 /** The layers of the sky that are shown are those of the annotated picture. */
@@ -272,44 +340,68 @@ const layers = () => {
   });
 };
 
-const downloads = (picture, report) => {
+/** Buttons for the answer: what many want, then the files. @param {Picture} picture @param {any} report @param {Answer} result */
+const buttons = (picture, report, result) => {
   const stem = picture.file.name.replace(/(\.fits)?\.[^.]*$/i, "");
-  const draw = async (kind, type, extension) => {
-    try {
-      const made = await engine.call("draw", key(picture), picture.file, picture.options, picture.equipment, kind, layers());
-      save(new Blob([made], { type }), `${stem}.${extension}`);
-    } catch (error) {
-      tell(error.message, true);
-    }
-  };
-  const all = [
-    ["Annotated picture (PNG)", () => draw("overlay", "image/png", "annotated.png")],
-    ["Page (HTML)", () => draw("html", "text/html", "html")],
-    ["Stars (CSV)", () => draw("csv", "text/csv", "csv")],
-    ["Report (JSON)", () => save(new Blob([`${picture.result.json}\n`], { type: "application/json" }), `${stem}.json`)],
+  const draw = async (kind, type) => new Blob([await engine.call("draw", key(picture), picture.file, picture.options, picture.equipment, kind, layers())], { type });
+  const saveDrawn = (kind, type, extension) => draw(kind, type).then((blob) => save(blob, `${stem}.${extension}`), (error) => tell(error.message, true));
+  /** @type {[string, (button: HTMLButtonElement) => unknown][]} */
+  const first = [["Save the picture", () => saveDrawn("overlay", "image/png", "annotated.png")]];
+  if (canShare()) first.unshift(["Share", () => share(() => draw("overlay", "image/png"), `${stem}.png`, sentence(report))]);
+  if (report.status === "identified") first.push(["Copy link: what would this camera see?", (button) => copyLink(cameraLink(report), button)]);
+  /** @type {[string, () => unknown][]} */
+  const files = [
+    ["Page (HTML)", () => saveDrawn("html", "text/html", "html")],
+    ["Stars (CSV)", () => saveDrawn("csv", "text/csv", "csv")],
+    ["Report (JSON)", () => save(new Blob([`${result.json}\n`], { type: "application/json" }), `${stem}.json`)],
   ];
-  if (report.status === "identified") all.push(["Coordinates (FITS header)", () => draw("wcs", "application/fits", "wcs")]);
-  return actions("Downloads", all);
+  if (report.status === "identified") files.push(["Coordinates (FITS header)", () => saveDrawn("wcs", "application/fits", "wcs")]);
+  const fold = Object.assign(document.createElement("details"), { id: "download-fold" });
+  fold.append(Object.assign(document.createElement("summary"), { textContent: "Files of the answer" }), actions("Downloads", files));
+  return [actions("Answer", first), fold];
 };
 
-const remedies = (picture, report) => {
-  const known = report.remedies.filter((name) => REMEDIES[name]);
-  const group = document.createElement("div");
-  if (known.length) {
-    const words = document.createElement("p");
-    words.textContent = "What may help:";
-    group.append(words, actions("What may help", known.map((name) => {
-      const [field, text] = REMEDIES[name];
-      return [text, () => {
-        byId("hints").open = true;
-        byId(field).focus();
-        byId(field).scrollIntoView({ block: "center" });
-      }];
-    })));
+/** The picture that is drawn, until it was shared: to draw may take longer than a browser waits. */
+let drawn = { name: "", /** @type {File | null} */ file: null };
+
+/** @param {() => Promise<Blob>} draw @param {string} name @param {string} text */
+const share = async (draw, name, text) => {
+  try {
+    if (drawn.name !== name + layers()) drawn = { name: name + layers(), file: new File([await draw()], name, { type: "image/png" }) };
+    await navigator.share({ files: drawn.file ? [drawn.file] : [], text });
+  } catch (error) {
+    if (error.name === "NotAllowedError") tell("The picture is drawn. Press Share once more.");
+    else if (error.name !== "AbortError") tell(error.message, true);
   }
-  group.append(downloads(picture, report));
-  return group;
 };
+
+/** An example, which is a drawing of the simulator. @param {string} name */
+const addExample = async (name) => {
+  try {
+    const response = await fetch(name);
+    if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+    add([new File([await response.blob()], name.replace("example-", ""))]);
+  } catch (error) {
+    tell(`The example could not be loaded: ${error.message}`, true);
+  }
+};
+
+/** What another app shared with this one. */
+const takeShared = async () => {
+  try {
+    const cache = await caches.open(SHARED_CACHE);
+    if (location.search) history.replaceState(null, "", location.pathname + location.hash);
+    const files = await Promise.all((await cache.keys()).map(async (request) => {
+      const response = await cache.match(request);
+      await cache.delete(request);
+      const name = decodeURIComponent(new URL(request.url).pathname.replace(/^.*\//, ""));
+      return response && new File([await response.blob()], name);
+    }));
+    if (files.length) await add(files.filter((file) => file !== undefined));
+  } catch { /* a browser without such storage has no such apps */ }
+};
+
+/** What is there before any picture. @type {Promise<void>} */ let restored = Promise.resolve();
 
 /** Sets the tab up, and prepares the catalog while the visitor looks for a picture: resolves when that is over. */
 export const photo = () => {
@@ -325,18 +417,26 @@ export const photo = () => {
     drop.classList.remove("over");
     add([...(event.dataTransfer?.files ?? [])]);
   });
-  byId("cancel").addEventListener("click", () => {
-    if (isReady) engine.stop();
-    else giveUp();
-    scout.stop();
+  byId("cancel").addEventListener("click", stop);
+  byId("cancel-all").addEventListener("click", () => {
+    for (const picture of pictures.filter(({ state }) => state === "waits")) {
+      Object.assign(picture, { state: "failed", error: `${picture.file.name} was canceled.` });
+      label(picture);
+      keep(picture);
+    }
+    stop();
   });
+  byId("clear").addEventListener("click", clear);
+  for (const button of document.querySelectorAll("[data-example]")) button.addEventListener("click", () => addExample(button.getAttribute("data-example") ?? ""));
   byId("hint-form").addEventListener("submit", (event) => {
     event.preventDefault();
     if (!chosen || chosen.state === "runs") return;
-    Object.assign(chosen, { state: "waits", options: stated(), equipment: equipment(), result: null, error: "" });
-    choose(chosen);
+    Object.assign(chosen, { state: "waits", options: stated(), equipment: equipment(), result: null, error: "", tries: 0 });
+    choose(chosen, true);
     next();
   });
+  restored = restore();
+  restored.then(takeShared).then(tellWhetherEmpty);
   engine.call("version").then((version) => { byId("version").textContent = version; }, (error) => tell(error.message, true));
   return engine.call("prepare").then(() => {
     isReady = wasReady = true;

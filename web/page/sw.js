@@ -15,12 +15,24 @@ const keep = async () => {
   await skipWaiting();
 };
 
+/** Where the page finds what another app shares with it. */
+const SHARED_CACHE = "shared-with-starpipe";
+
+/** Keeps the files of a form that another app sends, and shows the page. @param {Request} request */
+const takeShared = async (request) => {
+  const cache = await caches.open(SHARED_CACHE);
+  const files = (await request.formData()).getAll("pictures").filter((file) => file instanceof File);
+  await Promise.all(files.map((file, at) => cache.put(`shared/${at}/${encodeURIComponent(file.name)}`, new Response(file))));
+  return Response.redirect("./?shared", 303);
+};
+
 addEventListener("install", (event) => event.waitUntil(keep()));
 addEventListener("activate", (event) => {
   const old = (names) => names.filter((name) => name.startsWith("starpipe-") && name !== CACHE);
   event.waitUntil(caches.keys().then((names) => Promise.all(old(names).map((name) => caches.delete(name)))).then(() => clients.claim()));
 });
 addEventListener("fetch", (event) => {
+  if (event.request.method === "POST" && new URL(event.request.url).pathname.endsWith("/share")) return event.respondWith(takeShared(event.request));
   if (event.request.method !== "GET") return;
   event.respondWith(caches.match(event.request, { ignoreSearch: true, cacheName: CACHE }).then((kept) => kept ?? fetch(event.request)));
 });

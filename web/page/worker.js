@@ -1,6 +1,8 @@
-// The thread that computes. A message { id, call, values } is answered by { id, value } or { id, error, isFatal };
+// The thread that computes. Its first message is { module }, the program. A message { id, call, values } is answered by { id, value } or { id, error, isFatal };
 // { stage, share } between them tells how far it is.
+import { isTruncated, wholeRows } from "./cut.js";
 import { NUMBERS, STARS } from "./files.js";
+import { readable } from "./readable.js";
 import init, * as starpipe from "./starpipe.js";
 
 /** The browser's storage for the index of the catalog. */
@@ -8,7 +10,8 @@ const INDEX_CACHE = "index-of-starpipe";
 
 const progress = (stage, share) => postMessage({ stage, share });
 Object.assign(globalThis, { starpipeProgress: progress });
-const ready = init({ module_or_path: new URL("starpipe_bg.wasm", import.meta.url) });
+/** @type {(module: WebAssembly.Module) => void} */ let begin = () => {};
+const ready = new Promise((done) => { begin = done; }).then((module) => init({ module_or_path: module }));
 
 /** What `make` resolves to: made once, or again after it failed. @template T @param {() => Promise<T>} make */
 const once = (make) => {
@@ -83,7 +86,18 @@ const openSolver = once(async () => {
 /** The bright stars, indexed: within the module, and soon done. @type {starpipe.Solver | null} */
 let brightSolver = null;
 /** The frame that was solved last, and what it was solved from. */
-let last = { key: "", solved: null };
+let last = { key: "", solved: null, said: "" };
+
+/** The message of what fails; nothing where it does not. @param {() => void} act */
+const whyNot = (act) => {
+  try {
+    act();
+    return "";
+  } catch (error) {
+    if (!(error instanceof Error) || error instanceof WebAssembly.RuntimeError) throw error;
+    return error.message;
+  }
+};
 
 /** @param {File} file */
 const bytesOf = async (file) => new Uint8Array(await file.arrayBuffer());
@@ -96,11 +110,20 @@ const equipmentOf = async ({ camera, dark, flat }) => {
   return new starpipe.Equipment(ofCamera, ofDark, ofFlat);
 };
 
-/** @param {starpipe.Solver} solver @param {File} file @param {string} options @param {EquipmentFiles} files */
+/**
+ * The frame, and what is to be said of its file.
+ * @param {starpipe.Solver} solver @param {File} file @param {string} options @param {EquipmentFiles} files
+ */
 const solveWith = async (solver, file, options, files) => {
-  const [bytes, equipment] = await Promise.all([bytesOf(file), equipmentOf(files)]);
+  const [{ bytes, said }, equipment] = await Promise.all([readable(file), equipmentOf(files)]);
+  /** @param {Uint8Array} bytes */
+  const solve = (bytes) => solver.solve(bytes, file.name, options, equipment);
   try {
-    return solver.solve(bytes, file.name, options, equipment);
+    return { solved: solve(bytes), said };
+  } catch (error) {
+    const part = isTruncated(error) && wholeRows(bytes, (bytes) => whyNot(() => starpipe.preview(bytes, file.name)));
+    if (!part) throw error;
+    return { solved: solve(part.bytes), said: `The file is cut off: this is the answer for its first ${part.rows} of ${part.height} rows.` };
   } finally {
     equipment.free();
   }
@@ -110,10 +133,10 @@ const solve = async (key, file, options, files) => {
   const solver = await openSolver();
   if (last.key !== key) {
     last.solved?.free();
-    last = { key: "", solved: null };
-    last = { key, solved: await solveWith(solver, file, options, files) };
+    last = { key: "", solved: null, said: "" };
+    last = { key, ...await solveWith(solver, file, options, files) };
   }
-  return last.solved;
+  return last;
 };
 
 const calls = {
@@ -121,22 +144,22 @@ const calls = {
   prepare: async () => { await openSolver(); },
   stars: openCatalog,
   images: async (file) => starpipe.image_count(await bytesOf(file)),
-  preview: async (file, image) => starpipe.preview(await bytesOf(file), file.name, image),
+  preview: async (file, image) => starpipe.preview((await readable(file)).bytes, file.name, image),
   /** The report of a search among the bright stars alone. */
   glance: async (file, options, files) => {
     brightSolver ??= starpipe.Solver.of_bright_stars();
-    const solved = await solveWith(brightSolver, file, options, files);
+    const { solved } = await solveWith(brightSolver, file, options, files);
     const report = solved.json();
     solved.free();
     return report;
   },
   solve: async (key, file, options, files) => {
-    const solved = await solve(key, file, options, files);
+    const { solved, said } = await solve(key, file, options, files);
     const [html, data] = solved.view();
-    return { json: solved.json(), html, data };
+    return { json: solved.json(), html, data, said };
   },
   draw: async (key, file, options, files, kind, layers) => {
-    const solved = await solve(key, file, options, files);
+    const { solved } = await solve(key, file, options, files);
     return kind === "overlay" ? solved.overlay(layers) : solved[kind]();
   },
   limit: (stated) => starpipe.limit(stated),
@@ -151,7 +174,8 @@ const calls = {
   defocus: (study) => starpipe.defocus(study),
 };
 
-onmessage = async ({ data: { id, call, values } }) => {
+onmessage = async ({ data: { id, call, values, module } }) => {
+  if (module) return begin(module);
   try {
     await ready;
     postMessage({ id, value: await calls[call](...values) });

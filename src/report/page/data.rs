@@ -3,9 +3,9 @@
 use crate::base::format::to_decimals;
 use crate::catalog::Catalog;
 use crate::identify::StarMatch;
-use crate::report::FrameReport;
 use crate::report::frame_report::{CompletenessReport, StarReport};
 use crate::report::overlay::{SkyLayer, sky_layers};
+use crate::report::{AnnotationReport, FrameReport};
 use crate::solve::{Solution, Source};
 use serde::Serialize;
 
@@ -26,6 +26,8 @@ pub(super) struct PageData<'a> {
     predicted_vmag: Option<f64>,
     /// Lines and names of the sky.
     pub(super) sky: Vec<SkyLayer>,
+    /// What has a name in the frame.
+    annotations: &'a [AnnotationReport],
 }
 
 /// The columns of the detections, which take half of the room of rows with names.
@@ -92,6 +94,7 @@ impl<'a> PageData<'a> {
             limit50_vmag: photometry.and_then(|photometry| photometry.limit50_vmag),
             predicted_vmag: report.prediction.as_ref().and_then(|p| p.limit50_vmag),
             sky: sky_layers(solution, catalog),
+            annotations: &report.annotations,
         }
     }
 }

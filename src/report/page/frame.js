@@ -1,3 +1,86 @@
+// What a star is called.
+const titleOf = (star) => star.name || star.label || (star.hd ? `HD ${star.hd}` : "") || star.id || (star.kind === "other" ? "Not a star" : "Not identified");
+
+// A small card beside the star that was chosen.
+const makeCard = (card, view, onClose) => {
+  let star = null;
+  const add = (parent, tag, text) => parent.appendChild(Object.assign(document.createElement(tag), { textContent: text }));
+  const fixed = (value, decimals) => value.toFixed(decimals).replace("-", "−");
+  const linesOf = (star) => [
+    star.label === titleOf(star) ? "" : star.label,
+    star.v === undefined ? "" : `V ${fixed(star.v, 2)}`,
+    star.why && `Not measured: ${star.why}`,
+    star.ra === undefined ? "" : `RA ${fixed(star.ra, 3)}°, Dec ${fixed(star.dec, 3)}°`,
+    [star.id, star.hd && `HD ${star.hd}`, star.hip && `HIP ${star.hip}`].filter(Boolean).join(", "),
+    star.kind === "identified" && star.snr !== undefined ? `Signal to noise ${star.snr}` : "",
+    star.flags.join(", ").replaceAll("_", " "),
+  ];
+  const hide = () => { star = null; card.hidden = true; };
+  // Below the star, or above where there is no room; it may leave the picture, but not its width.
+  const place = () => {
+    if (!star) return;
+    const GAP = 18;
+    const at = new DOMPoint(star.x, star.y).matrixTransform(view.getScreenCTM()), frame = view.getBoundingClientRect();
+    const [x, y] = [at.x - frame.left, at.y - frame.top];
+    card.hidden = x < 0 || y < 0 || x > frame.width || y > frame.height;
+    if (card.hidden) return;
+    const left = Math.min(Math.max(x - card.offsetWidth / 2, 4), Math.max(frame.width - card.offsetWidth - 4, 4));
+    const isAbove = y > frame.height / 2 && at.y > card.offsetHeight + GAP;
+    card.style.left = `${left}px`;
+    card.style.top = `${isAbove ? y - GAP - card.offsetHeight : y + GAP}px`;
+  };
+  const show = (chosen) => {
+    star = chosen;
+    card.replaceChildren();
+    add(card, "b", titleOf(star));
+    const close = add(card, "button", "×");
+    close.type = "button";
+    close.setAttribute("aria-label", "Close");
+    close.addEventListener("click", onClose);
+    for (const line of linesOf(star)) if (line) add(card, "p", line);
+    card.hidden = false;
+    place();
+  };
+  card.addEventListener("keydown", (event) => { if (event.key === "Escape") onClose(); });
+  return { show, hide, place };
+};
+
+// A map of the stars that covers a share of the photograph, from its left side. It is made when it is wanted.
+const makeChart = (view, data, stars) => {
+  const MOST = 800;
+  const { width, height } = data;
+  // An element of its own clips what leaves it.
+  const chart = make(view, "svg", { x: -0.5, y: -0.5, height, class: "chart" });
+  const edge = make(view, "path", { class: "edge" });
+  let dots = [], share = 0, last = 1;
+  const fill = () => {
+    make(chart, "rect", { class: "back", x: -0.5, y: -0.5, width, height });
+    const lines = data.sky.filter(({ key }) => key === "constellations").flatMap((layer) => layer.lines);
+    for (const line of lines) make(chart, "path", { d: `M${line.map((at) => at.join(" ")).join("L")}` });
+    const known = stars.filter(({ kind, v }) => v !== undefined && (kind === "identified" || kind === "unmeasured"));
+    known.sort((a, b) => a.v - b.v);
+    const brightest = known[0]?.v ?? 0;
+    dots = known.slice(0, MOST).map(({ x, y, v }) => ({ node: make(chart, "circle", { cx: x, cy: y }), r: Math.max(4.5 - 0.75 * (v - brightest), 0.6) }));
+  };
+  const scale = (u) => {
+    last = u;
+    const small = view.clientWidth < 600 ? 0.7 : 1;
+    if (share) for (const { node, r } of dots) node.setAttribute("r", r * u * small);
+  };
+  const show = (wanted) => {
+    share = wanted;
+    if (share && !dots.length) fill();
+    const wide = share * width;
+    chart.style.display = edge.style.display = share ? "" : "none";
+    chart.setAttribute("width", wide);
+    chart.setAttribute("viewBox", `-0.5 -0.5 ${Math.max(wide, 1e-3)} ${height}`);
+    edge.setAttribute("d", `M${wide - 0.5} -0.5V${height - 0.5}`);
+    scale(last);
+  };
+  show(0);
+  return { show, scale };
+};
+
 // Brings the elements of a frame in `root` to life: picture, figures and table.
 const showFrame = (root, data) => {
   const byId = (id) => root.querySelector(`#${id}`);
@@ -7,16 +90,27 @@ const showFrame = (root, data) => {
     const given = columns.filter(([, values]) => values[row] !== null);
     return Object.fromEntries(given.map(([key, values]) => [key, values[row]]));
   });
+  // What is known of them in words, and what was not measured.
+  const annotations = data.annotations ?? [];
+  const labels = new Map(annotations.filter(({ detection }) => Number.isInteger(detection)).map((it) => [it.detection, it.label]));
   const unlikeStars = new Set(data.unlike_stars);
   stars.forEach((star, index) => {
     star.index = index;
     star.kind = star.id ? "identified" : unlikeStars.has(index) ? "other" : "unidentified";
     star.residual = star.dx === undefined ? undefined : Math.hypot(star.dx, star.dy);
+    star.label = labels.get(index);
   });
+  const isPoint = ({ kind, detection, x, y }) => ["star", "body"].includes(kind) && !Number.isInteger(detection) && Number.isFinite(x) && Number.isFinite(y);
+  const unmeasured = annotations.filter(isPoint).map((it) => ({
+    kind: "unmeasured", x: it.x, y: it.y, name: it.name || it.label, label: it.label, v: it.vmag ?? undefined, id: it.id ?? undefined,
+    why: it.why || "it was not detected", flags: [],
+  }));
+  const marked = [...stars, ...unmeasured];
 
   // The picture: the view box is what is seen of the frame, in its pixels.
   const view = byId("view");
   const layers = {};
+  const chart = makeChart(view, data, marked);
   for (const { key, lines, circles, texts } of data.sky) {
     const layer = layers[key] = make(view, "g", { class: `sky ${key}` });
     for (const line of lines) make(layer, "path", { d: `M${line.map((at) => at.join(" ")).join("L")}` });
@@ -29,6 +123,7 @@ const showFrame = (root, data) => {
   // Pixels of the frame in one of the screen.
   const unit = () => Math.max(box.w / Math.max(view.clientWidth, 1), box.h / Math.max(view.clientHeight, 1));
   const radius = (star) => {
+    if (star.kind === "unmeasured") return 13;
     const above = star.flux > 0 ? 2.5 * Math.log10(star.flux / faintest) : 0;
     return Math.min(4 + Math.max(above, 0), 13);
   };
@@ -36,27 +131,20 @@ const showFrame = (root, data) => {
   const faintest = fluxes.length ? fluxes[Math.floor(fluxes.length * 0.2)] : 1;
   const residuals = stars.map((star) => star.residual).filter((r) => r !== undefined).sort((a, b) => a - b);
   const typical = residuals.length ? Math.max(residuals[Math.floor(residuals.length / 2)], 1e-3) : 1;
-  for (const star of stars) {
-    const tag = star.kind === "identified" ? "circle" : star.kind === "other" ? "path" : "rect";
-    star.shape = make(layers[star.kind], tag, { class: `shape ${star.kind}` });
-    star.shape.star = star;
+  for (const star of marked) {
+    const tag = { identified: "circle", unmeasured: "circle", other: "path" }[star.kind] ?? "rect";
+    star.shape = make(layers[star.kind] ?? layers.identified, tag, { class: `shape ${star.kind}` });
     if (star.residual !== undefined) star.arrow = make(layers.residuals, "path", { class: "arrow" });
   }
   let chosen = null;
   const placeShapes = () => {
     const u = unit();
-    // As many rings as leave the picture to be seen, brightest first; closer up there are more.
-    const AREA_PER_RING = 900;
-    let rings = Math.ceil(view.clientWidth * view.clientHeight / AREA_PER_RING);
-    for (const star of stars) {
+    const ringed = ringedStars();
+    for (const star of marked) {
       const { x, y, shape } = star;
       const r = radius(star) * u;
-      if (star.kind === "identified") {
-        const isInView = x > box.x && x < box.x + box.w && y > box.y && y < box.y + box.h;
-        if (isInView) rings -= 1;
-        shape.style.visibility = star === chosen || (isInView && rings >= 0) ? "" : "hidden";
-      }
-      if (star.kind === "identified") {
+      if (star.kind === "identified") shape.style.visibility = star === chosen || ringed.has(star) ? "" : "hidden";
+      if (star.kind === "identified" || star.kind === "unmeasured") {
         shape.setAttribute("cx", x); shape.setAttribute("cy", y); shape.setAttribute("r", r);
       } else if (star.kind === "other") {
         shape.setAttribute("d", `M${x - r} ${y - r}l${2 * r} ${2 * r}m${-2 * r} 0l${2 * r} ${-2 * r}`);
@@ -70,26 +158,40 @@ const showFrame = (root, data) => {
       }
     }
     for (const node of skyTexts) { node.setAttribute("font-size", 12 * u); node.setAttribute("stroke-width", 3 * u); }
-    placeNames(u);
+    placeNames(u, ringed);
+    chart.scale(u);
+    card.place();
+  };
+  const isInView = ({ x, y }) => x > box.x && x < box.x + box.w && y > box.y && y < box.y + box.h;
+  // Few rings leave the picture to be seen: the brightest in view, so that there are more closer up.
+  const ringedStars = () => {
+    const [areaPerRing, most] = byId("all-rings")?.checked ? [900, Infinity] : [9000, 40];
+    const count = Math.min(Math.ceil(view.clientWidth * view.clientHeight / areaPerRing), most);
+    const inView = marked.filter((star) => isInView(star) && (star.kind === "identified" || star.kind === "unmeasured"));
+    inView.sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
+    return new Set(inView.slice(0, count));
   };
   // The brightest stars in view, where there is room.
-  const byMagnitude = stars.filter((star) => star.name || star.id).sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
-  const placeNames = (u) => {
+  const byMagnitude = marked.filter((star) => star.name || star.id).sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
+  const placeNames = (u, ringed) => {
     const MOST = 60, SIZE = 12;
     layers.names.replaceChildren();
     const roomOf = (x, y, text) => [x, y - SIZE * u, x + text.length * SIZE * 0.6 * u, y + 3 * u];
     const skyNames = [...skyTexts].filter((node) => node.parentNode.style.display !== "none");
     const taken = skyNames.map((node) => roomOf(Number(node.getAttribute("x")), Number(node.getAttribute("y")), node.textContent));
-    const shown = byMagnitude.filter((s) => s.x > box.x && s.x < box.x + box.w && s.y > box.y && s.y < box.y + box.h);
+    const shown = byMagnitude.filter((star) => ringed.has(star) || star === chosen);
     const named = shown.filter((star) => star.name);
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
       if (taken.length >= MOST + skyNames.length) break;
       const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
-      const at = [star.x + (radius(star) + 4) * u, star.y + SIZE * 0.35 * u];
-      const room = roomOf(...at, text);
+      // To the left of its star where it would leave the picture.
+      const off = (radius(star) + 4) * u, wide = text.length * SIZE * 0.6 * u;
+      const isLeft = star.x + off + 0.88 * wide > box.x + box.w;
+      const at = [star.x + (isLeft ? -off : off), star.y + SIZE * 0.35 * u];
+      const room = roomOf(at[0] - (isLeft ? wide : 0), at[1], text);
       if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
       taken.push(room);
-      make(layers.names, "text", { x: at[0], y: at[1], "font-size": SIZE * u, "stroke-width": 3 * u }, text);
+      make(layers.names, "text", { x: at[0], y: at[1], "text-anchor": isLeft ? "end" : "start", "font-size": SIZE * u, "stroke-width": 3 * u }, text);
     }
   };
   let frame = 0;
@@ -136,19 +238,50 @@ const showFrame = (root, data) => {
       const to = middle();
       move((from[0] - to[0]) * unit(), (from[1] - to[1]) * unit());
       if (wide) zoom(apart() / wide, ...pointOf({ clientX: to[0], clientY: to[1] }));
-    } else if (event.target.star) {
-      tell(event.target.star);
+    } else if (event.pointerType === "mouse") {
+      const star = starAt(event, MOUSE_REACH);
+      if (star) tell(star);
     }
   });
-  view.addEventListener("click", (event) => { if (event.target.star) choose(event.target.star, false); });
+  // A finger is wider than a star. One with a ring is what is meant, where fainter ones are near.
+  const FINGER_REACH = 24, MOUSE_REACH = 10;
+  const starAt = (event, reach) => {
+    const [x, y] = pointOf(event), u = unit();
+    const isShown = (star) => star.shape.style.display !== "none" && star.shape.parentNode.style.display !== "none";
+    let nearest = null, least = reach;
+    for (const star of marked) {
+      if (!isShown(star)) continue;
+      const hasRing = star.shape.style.visibility !== "hidden";
+      const off = Math.hypot(star.x - x, star.y - y) / u - (hasRing ? reach / 2 : 0);
+      if (off < least) [nearest, least] = [star, off];
+    }
+    return nearest;
+  };
+  // A drag ends with a click, too.
+  let pressed = null;
+  view.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  view.addEventListener("click", (event) => {
+    if (pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 6) return;
+    const star = starAt(event, event.pointerType === "mouse" ? MOUSE_REACH : FINGER_REACH);
+    if (star) choose(star, false);
+    else leave();
+  });
   view.addEventListener("keydown", (event) => {
     const step = box.w / 8;
     const keys = {
       "+": () => zoom(1.5), "=": () => zoom(1.5), "-": () => zoom(1 / 1.5), "0": whole,
+      n: () => next(1), p: () => next(-1), Escape: () => leave(),
       ArrowLeft: () => move(-step, 0), ArrowRight: () => move(step, 0), ArrowUp: () => move(0, -step), ArrowDown: () => move(0, step),
     };
     if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
   });
+  // The next star by brightness, or the one before.
+  const next = (by) => {
+    const known = byMagnitude.filter(isInView);
+    if (!known.length) return;
+    const at = known.indexOf(chosen);
+    choose(known[at < 0 ? 0 : (at + by + known.length) % known.length], false);
+  };
   for (const button of root.querySelectorAll("[data-zoom]")) {
     const factor = Number(button.dataset.zoom);
     button.addEventListener("click", () => (factor ? zoom(factor) : whole()));
@@ -164,10 +297,13 @@ const showFrame = (root, data) => {
     apply();
   }
 
+  byId("all-rings").addEventListener("change", show);
+  byId("wipe")?.addEventListener("input", () => chart.show(Number(byId("wipe").value) / 100));
+
   // One star: under the picture, in the picture and in the table.
   const number = (value, decimals) => (value === undefined || value === null ? "" : value.toFixed(decimals));
   const tell = (star) => {
-    const parts = [star.name || star.id || (star.kind === "other" ? "not a star" : "not identified")];
+    const parts = [titleOf(star)];
     if (star.name && star.id) parts.push(star.id);
     if (star.hd) parts.push(`HD ${star.hd}`);
     if (star.hip) parts.push(`HIP ${star.hip}`);
@@ -176,29 +312,38 @@ const showFrame = (root, data) => {
     parts.push(`x ${number(star.x, 2)} y ${number(star.y, 2)}`);
     if (star.snr !== undefined) parts.push(`SNR ${star.snr}`);
     if (star.residual !== undefined) parts.push(`residual ${number(star.residual, 3)} px`);
+    if (star.why) parts.push(`not measured: ${star.why}`);
     if (star.flags.length) parts.push(star.flags.join(" "));
     byId("under").textContent = parts.join(" · ");
   };
+  const card = makeCard(byId("card"), view, () => { leave(); view.focus({ preventScroll: true }); });
+  const nodesOf = (star) => [star.shape, ...(star.index === undefined ? [] : [table.rowOf(star)])];
+  const leave = () => {
+    for (const node of chosen ? nodesOf(chosen) : []) node.classList.remove("chosen");
+    chosen = null;
+    card.hide();
+    show();
+  };
   const choose = (star, center) => {
-    for (const node of chosen ? [chosen.shape, table.rowOf(chosen)] : []) node.classList.remove("chosen");
+    for (const node of chosen ? nodesOf(chosen) : []) node.classList.remove("chosen");
     chosen = star;
-    const row = table.rowOf(star);
-    for (const node of [star.shape, row]) node.classList.add("chosen");
+    for (const node of nodesOf(star)) node.classList.add("chosen");
     if (center) {
       if (box.w > width / 4) zoom(box.w / (width / 4));
       move(star.x - box.x - box.w / 2, star.y - box.y - box.h / 2);
-    } else {
-      row.scrollIntoView({ block: "nearest" });
+      byId("seen").scrollIntoView({ block: "nearest" });
     }
+    card.show(star);
     show();
-    tell(star);
+    // Fingers do not hover: there the card alone tells.
+    if (matchMedia("(hover: hover)").matches) tell(star);
   };
 
   // The table, with the marks in the picture of what is left in it.
   const text = (key) => (s) => s[key] || "";
   const column = (key, title, shown, isText = false) => ({ key, title, isText, text: shown, value: (s) => s[key] });
   const table = makeTable(root.querySelector("section.table"), [
-    column("name", "Name", text("name"), true), column("id", "Catalogue", text("id"), true), column("hd", "HD", text("hd")),
+    column("name", "Name", text("name"), true), column("id", "Catalog", text("id"), true), column("hd", "HD", text("hd")),
     column("v", "V", (s) => number(s.v, 2)), column("snr", "SNR", (s) => s.snr ?? ""), column("flux", "Flux", (s) => s.flux ?? ""),
     column("x", "x", (s) => number(s.x, 2)), column("y", "y", (s) => number(s.y, 2)),
     column("ra", "RA (°)", (s) => number(s.ra, 4)), column("dec", "Dec (°)", (s) => number(s.dec, 4)),
@@ -245,7 +390,7 @@ const showFrame = (root, data) => {
   const bins = data.completeness.filter((bin) => bin.stars > 0);
   if (bins.length > 1) {
     const [low, high] = [bins[0].vmag - 0.25, bins[bins.length - 1].vmag + 0.25];
-    const plot = figure("Share of the catalogue's stars that are found", ["V (mag)", low, high], ["share", 0, 1]);
+    const plot = figure("Share of the catalog's stars that are found", ["V (mag)", low, high], ["share", 0, 1]);
     for (const bin of bins) {
       const part = bin.detected / bin.stars;
       const bar = make(plot.svg, "rect", { class: "part", x: plot.x(bin.vmag - 0.22), y: plot.y(part), width: plot.x(0.44) - plot.x(0), height: plot.y(0) - plot.y(part) });
@@ -260,6 +405,8 @@ const showFrame = (root, data) => {
     mark(data.predicted_vmag, "predicted", "predicted", 24);
   }
 
+  byId("figures-fold").hidden = !byId("figures").childElementCount;
+  byId("table-fold").hidden = !stars.length;
   show();
   new ResizeObserver(show).observe(view);
 };

@@ -8,7 +8,7 @@ use super::template::{PageKind, picture_address, render, render_view, shown_data
 use crate::catalog::Catalog;
 use crate::frame::Frame;
 use crate::report::overlay::{OverlayOptions, Shown, jpeg, photograph, thumbnail};
-use crate::report::{FrameReport, TextOptions};
+use crate::report::{FrameReport, TextOptions, sky_figure};
 use crate::solve::Solution;
 use minijinja::context;
 use minijinja::value::{Serde, Value};
@@ -99,6 +99,7 @@ fn values(
         text => report.to_text(TextOptions::default()),
         picture,
         layers,
+        sky => sky_figure::svg(report),
     }
 }
 

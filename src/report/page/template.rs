@@ -18,9 +18,11 @@ pub(super) struct PageKind {
     pub(super) script: &'static str,
 }
 
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 8] = [
     ("base.html", include_str!("base.html")),
     ("view.html", include_str!("view.html")),
+    ("notes.html", include_str!("notes.html")),
+    ("picture.html", include_str!("picture.html")),
     ("report.html", include_str!("report.html")),
     ("table.html", include_str!("table.html")),
     ("frame.html", include_str!("frame.html")),
@@ -33,6 +35,7 @@ pub(super) fn render(kind: &PageKind, values: Value, data: &impl Serialize) -> i
         "\"use strict\";\n(() => {\n",
         include_str!("table.js"),
         include_str!("figure.js"),
+        include_str!("print.js"),
         kind.script,
         "})();\n",
     ];
