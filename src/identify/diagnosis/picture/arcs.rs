@@ -1,13 +1,11 @@
 //! Star trails: arcs about one point, the celestial pole, or parallel lines where the pole is far.
 
 use super::light::Light;
-use super::shapes::{Shape, shapes};
-use crate::base::statistics::median_of;
+use super::shapes::Shape;
+use crate::base::statistics::{log10_binomial_tail, median_of};
 use crate::identify::diagnosis::cause::Diagnosis;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A trail is above so many standard deviations of the noise.
-const NOISE_SIGMA: f32 = 5.0;
 /// Smaller regions tell nothing, in pixels.
 const MIN_AREA_PX: f64 = 15.0;
 /// A trail is so long, in pixels, and so much longer than broad, …
@@ -15,44 +13,51 @@ const SHORTEST_PX: f64 = 9.0;
 const ELONGATION: f64 = 2.5;
 /// … and its stroke is as thin as a star.
 const SLIM: f64 = 3.0;
+const THICKEST_PX: f64 = 9.0;
+/// Shorter ones than this share of the longest are left out.
+const SHORT: f64 = 0.25;
 /// Fewest trails, and their smallest share of the regions.
 const MIN_TRAILS: usize = 6;
 const SHARE: f64 = 0.55;
+/// The same of arcs about one point, which nothing else is.
+const SHARE_ABOUT_POLE: f64 = 0.2;
 /// So many of the longest trails propose poles.
 const PROPOSING: usize = 36;
 /// How far a trail may be from the direction that it has about a pole, in radians, and for a pixel at its ends.
 const TOLERANCE_RAD: f64 = 0.06;
 const TOLERANCE_PX: f64 = 1.0;
-/// Share of the trails that run about the pole.
-const AGREEING: f64 = 0.7;
+/// Share of the trails that run about the pole, and log10 of the greatest probability that as many do by chance.
+const AGREEING: f64 = 0.4;
+const LOG10_CHANCE: f64 = -6.0;
 /// The mean of unit vectors at twice the angles of trails that are parallel: a pole is no longer told then.
 const PARALLEL: f64 = 0.985;
 
 /// Arcs about one point, or parallel trails; `None` where most of what stands out is something else.
 pub(super) fn find(light: &Light) -> Option<Diagnosis> {
-    let mut mask: Vec<bool> = light
-        .above
-        .iter()
-        .map(|value| *value > NOISE_SIGMA * light.noise)
-        .collect();
-    let mut regions = shapes(&mut mask, light.frame.width);
-    regions.retain(|shape| shape.area() >= MIN_AREA_PX);
-    let count = regions.len();
-    let mut trails: Vec<Shape> = regions.into_iter().filter(is_trail).collect();
-    if trails.len() < MIN_TRAILS || (trails.len() as f64) < SHARE * count as f64 {
+    let regions = light.spots();
+    let telling = || regions.iter().filter(|shape| shape.area() >= MIN_AREA_PX);
+    let count = telling().count();
+    let mut trails: Vec<&Shape> = telling().filter(|shape| is_trail(shape)).collect();
+    let is_share = |share: f64| trails.len() as f64 > share * count as f64;
+    if trails.len() < MIN_TRAILS || !is_share(SHARE_ABOUT_POLE) {
         return None;
     }
+    let are_most = is_share(SHARE);
     trails.sort_by(|a, b| b.length.total_cmp(&a.length));
-    about_a_pole(&trails, light).or_else(|| parallel(&trails, light))
+    // Blocks of JPEG files are short, and in any direction.
+    let least = SHORT * trails[MIN_TRAILS - 1].length;
+    trails.retain(|trail| trail.length > least);
+    about_a_pole(&trails, light).or_else(|| are_most.then(|| parallel(&trails, light)).flatten())
 }
 
 fn is_trail(shape: &Shape) -> bool {
     shape.length > SHORTEST_PX
         && shape.length > ELONGATION * shape.breadth
         && shape.extent() > SLIM * shape.thickness()
+        && shape.thickness() < THICKEST_PX
 }
 
-fn alignment(trails: &[Shape]) -> (f64, f64) {
+fn alignment(trails: &[&Shape]) -> (f64, f64) {
     let sum = trails.iter().fold([0.0, 0.0], |[x, y], trail| {
         let (sin, cos) = libm::sincos(2.0 * trail.angle_rad);
         [x + cos, y + sin]
@@ -61,10 +66,16 @@ fn alignment(trails: &[Shape]) -> (f64, f64) {
     (share, libm::atan2(sum[1], sum[0]) / 2.0)
 }
 
-fn parallel(trails: &[Shape], light: &Light) -> Option<Diagnosis> {
+fn parallel(trails: &[&Shape], light: &Light) -> Option<Diagnosis> {
     const ALIGNED: f64 = 0.9;
-    let (share, angle_rad) = alignment(trails);
-    let length = median_of(trails.iter().map(|trail| trail.length))?;
+    // Lines from border to border are of the detector, or of a frame around the picture.
+    let is_whole = |trail: &&&Shape| !trail.touches(light.frame.width, light.frame.height);
+    let whole: Vec<&Shape> = trails.iter().filter(is_whole).copied().collect();
+    if whole.len() < MIN_TRAILS {
+        return None;
+    }
+    let (share, angle_rad) = alignment(&whole);
+    let length = median_of(whole.iter().map(|trail| trail.length))?;
     (share > ALIGNED).then_some(Diagnosis::Trails {
         trails: trails.len(),
         // y points down; angles are counted as seen.
@@ -74,7 +85,7 @@ fn parallel(trails: &[Shape], light: &Light) -> Option<Diagnosis> {
 }
 
 /// Trails that run about one point. It is near enough to be told where they are not parallel.
-fn about_a_pole(trails: &[Shape], light: &Light) -> Option<Diagnosis> {
+fn about_a_pole(trails: &[&Shape], light: &Light) -> Option<Diagnosis> {
     if alignment(trails).0 > PARALLEL {
         return None;
     }
@@ -82,7 +93,7 @@ fn about_a_pole(trails: &[Shape], light: &Light) -> Option<Diagnosis> {
     let mut best: Option<(usize, [f64; 2])> = None;
     for (index, first) in proposing.iter().enumerate() {
         for second in &proposing[index + 1..] {
-            let Some(pole) = pole_of([first, second].into_iter()) else {
+            let Some(pole) = pole_of([*first, *second].into_iter()) else {
                 continue;
             };
             let agreeing = trails
@@ -96,14 +107,22 @@ fn about_a_pole(trails: &[Shape], light: &Light) -> Option<Diagnosis> {
     }
     let (_, mut pole) = best?;
     for _ in 0..3 {
-        pole = pole_of(trails.iter().filter(|trail| runs_about(trail, pole)))?;
+        pole = pole_of(
+            trails
+                .iter()
+                .copied()
+                .filter(|trail| runs_about(trail, pole)),
+        )?;
     }
     let agreeing: Vec<&Shape> = trails
         .iter()
+        .copied()
         .filter(|trail| runs_about(trail, pole))
         .collect();
-    let is_enough =
-        agreeing.len() >= MIN_TRAILS && agreeing.len() as f64 >= AGREEING * trails.len() as f64;
+    let is_enough = agreeing.len() >= MIN_TRAILS
+        && agreeing.len() as f64 >= AGREEING * trails.len() as f64
+        && is_near(pole, light)
+        && log10_chance(trails, agreeing.len()) < LOG10_CHANCE;
     let turn_rad = is_enough
         .then(|| turn_rad(&agreeing, pole, light))
         .flatten()?;
@@ -137,7 +156,28 @@ fn runs_about(trail: &Shape, pole: [f64; 2]) -> bool {
     let [dx, dy] = [trail.middle[0] - pole[0], trail.middle[1] - pole[1]];
     let radial = libm::atan2(dy, dx) + FRAC_PI_2 - trail.angle_rad;
     let off = radial - PI * (radial / PI).round();
-    off.abs() < TOLERANCE_RAD + TOLERANCE_PX / trail.length
+    off.abs() < tolerance_rad(trail)
+}
+
+/// Whether the pole is near enough to be told from trails in one direction.
+fn is_near(pole: [f64; 2], light: &Light) -> bool {
+    /// Distance from the middle, in diagonals of the picture.
+    const FAR: f64 = 3.0;
+    let (width, height) = (light.frame.width as f64, light.frame.height as f64);
+    let away = libm::hypot(pole[0] - width / 2.0, pole[1] - height / 2.0);
+    away < FAR * libm::hypot(width, height)
+}
+
+/// log10 of the probability that of trails in random directions as many run about one of the proposed poles.
+fn log10_chance(trails: &[&Shape], agreeing: usize) -> f64 {
+    let tolerances = trails.iter().map(|trail| tolerance_rad(trail));
+    let chance = tolerances.sum::<f64>() / trails.len() as f64 / FRAC_PI_2;
+    let proposals = trails.len().min(PROPOSING).pow(2) as f64 / 2.0;
+    libm::log10(proposals) + log10_binomial_tail(trails.len(), agreeing, chance.min(1.0))
+}
+
+fn tolerance_rad(trail: &Shape) -> f64 {
+    TOLERANCE_RAD + TOLERANCE_PX / trail.length
 }
 
 /// How far the sky turned: the angle that most of the longer trails have at the pole. Trails that the border cuts

@@ -4,12 +4,13 @@ use super::light::Light;
 use super::shapes::{Shape, shapes};
 use crate::base::statistics::median;
 use crate::frame::Frame;
+use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 
 /// The longer side is reduced to about so many pixels.
 const SIDE_PX: usize = 512;
 /// Edges of a disc are looked for at these shares of its height.
-const HEIGHTS: [f32; 4] = [0.25, 0.5, 0.75, 0.95];
+const HEIGHTS: [f32; 4] = [0.25, 0.5, 0.75, 0.9];
 /// Smallest share of what is above that height.
 const SHARE: f64 = 0.4;
 /// Smallest diameter, as a share of the longer side. Stars are smaller, and so are planets.
@@ -19,7 +20,9 @@ const OFF_CIRCLE: f64 = 0.06;
 const OFF_CIRCLE_PX: f64 = 1.0;
 /// … along so many of 72 parts: of a crescent, a half.
 const PARTS: usize = 72;
-const MIN_PARTS: usize = 30;
+const MIN_PARTS: usize = 28;
+/// … and of a whole disc, most.
+const MOST_PARTS: usize = 48;
 /// It is above the sky by this share of full scale.
 const CONTRAST: f32 = 0.2;
 /// Share of its light that is left a little outside its limb, …
@@ -46,46 +49,40 @@ pub(super) fn find(light: &Light) -> Option<Disc> {
         return None;
     }
     HEIGHTS.iter().find_map(|height| {
-        let threshold = sky + height * (highest - sky);
-        let circle = largest(&small, threshold)?;
-        circle.is_disc(&small, sky, light.full).then(|| {
-            let pixel = (factor * light.factor) as f64;
-            Disc {
-                middle_px: circle.middle.map(|at| (at + 0.5) * pixel - 0.5),
-                diameter_px: 2.0 * circle.radius * pixel,
-            }
+        let region = largest(&small, sky + height * (highest - sky))?;
+        let limb = Circle::of_limb(&region, small.width);
+        let middling = Circle::middling(&region, small.width);
+        limb.into_iter().chain([middling]).find_map(|circle| {
+            circle.is_disc(&small, [sky, light.full]).then(|| {
+                let pixel = (factor * light.factor) as f64;
+                Disc {
+                    middle_px: circle.middle.map(|at| (at + 0.5) * pixel - 0.5),
+                    diameter_px: 2.0 * circle.radius * pixel,
+                }
+            })
         })
     })
 }
 
-/// The largest region above a threshold, and the circle around it.
-struct Circle {
-    region: Shape,
+/// A region, and a circle that may be its limb.
+struct Circle<'a> {
+    region: &'a Shape,
     middle: [f64; 2],
     radius: f64,
+    /// In how many directions the region ends at the circle, and how many are needed.
+    limb_parts: usize,
+    least_parts: usize,
 }
 
-fn largest(small: &Frame, threshold: f32) -> Option<Circle> {
-    let mut mask: Vec<bool> = small
-        .pixels
-        .values()
-        .map(|value| value > threshold)
-        .collect();
-    let regions = shapes(&mut mask, small.width);
+/// The largest region above a threshold, unless it has only a small part of what is above it.
+fn largest(small: &Frame, threshold: f32) -> Option<Shape> {
+    let is_above = small.pixels.values().map(|value| value > threshold);
+    let regions = shapes(is_above, small.width);
     let all: f64 = regions.iter().map(Shape::area).sum();
-    let region = regions
+    let largest = regions
         .into_iter()
         .max_by(|a, b| a.area().total_cmp(&b.area()))?;
-    if region.area() < SHARE * all {
-        return None;
-    }
-    let places: Vec<[f64; 2]> = places(&region, small.width).collect();
-    let (middle, radius) = enclosing(&places);
-    Some(Circle {
-        region,
-        middle,
-        radius,
-    })
+    (largest.area() >= SHARE * all).then_some(largest)
 }
 
 fn places(region: &Shape, width: usize) -> impl Iterator<Item = [f64; 2]> {
@@ -93,32 +90,126 @@ fn places(region: &Shape, width: usize) -> impl Iterator<Item = [f64; 2]> {
     index.map(move |index| [(index % width) as f64, (index / width) as f64])
 }
 
-/// The smallest circle around points.
-///
-/// # Reference
-/// Badoiu & Clarkson 2003, SODA 801: the middle goes to the farthest point, each time by less.
-fn enclosing(points: &[[f64; 2]]) -> ([f64; 2], f64) {
-    const STEPS: u32 = 200;
-    let mut middle = points[0];
-    let farthest = |middle: [f64; 2]| {
-        let distance = |p: &[f64; 2]| libm::hypot(p[0] - middle[0], p[1] - middle[1]);
-        let far = points
-            .iter()
-            .max_by(|a, b| distance(a).total_cmp(&distance(b)));
-        far.map_or((middle, 0.0), |far| (*far, distance(far)))
-    };
-    for step in 1..=STEPS {
-        let (far, _) = farthest(middle);
-        let share = 1.0 / f64::from(step + 1);
-        middle = [0, 1].map(|axis| middle[axis] + share * (far[axis] - middle[axis]));
+/// First and last pixel of a region in each row.
+fn ends(region: &Shape, width: usize) -> Vec<[f64; 2]> {
+    let rows = region.top as usize..=region.bottom as usize;
+    let mut ends: Vec<[f64; 2]> = rows.clone().map(|_| [f64::MAX, f64::MIN]).collect();
+    for [x, y] in places(region, width) {
+        let [first, last] = &mut ends[(y - region.top) as usize];
+        (*first, *last) = (first.min(x), last.max(x));
     }
-    (middle, farthest(middle).1 + 0.5)
+    let side = |end: usize| {
+        ends.iter()
+            .zip(rows.clone())
+            .map(move |(ends, y)| [ends[end], y as f64])
+    };
+    side(0).chain(side(1)).collect()
 }
 
-impl Circle {
-    fn is_disc(&self, small: &Frame, sky: f32, full: f32) -> bool {
+/// The circle through three of the points at the edge of a region on which most of them lie.
+fn most_common_circle(edge: &[[f64; 2]], extent: f64) -> Option<([f64; 2], f64)> {
+    /// So many points are tried.
+    const TRIED: usize = 24;
+    /// Largest radius over the extent of the region: a straight edge is on larger ones.
+    const LARGEST: f64 = 0.65;
+    let points: Vec<[f64; 2]> = edge
+        .iter()
+        .step_by(edge.len().div_ceil(TRIED))
+        .copied()
+        .collect();
+    let mut best: Option<(usize, ([f64; 2], f64))> = None;
+    for (i, &a) in points.iter().enumerate() {
+        for (j, &b) in points.iter().enumerate().skip(i + 1) {
+            for &c in &points[j + 1..] {
+                let Some((middle, radius)) = circle_through(a, b, c) else {
+                    continue;
+                };
+                if radius > LARGEST * extent {
+                    continue;
+                }
+                let off = (OFF_CIRCLE * radius).max(OFF_CIRCLE_PX);
+                let distance = |p: &&[f64; 2]| libm::hypot(p[0] - middle[0], p[1] - middle[1]);
+                let is_on = |p: &&[f64; 2]| (distance(p) - radius).abs() < off;
+                let count = points.iter().filter(is_on).count();
+                if best.is_none_or(|(most, _)| count > most) {
+                    best = Some((count, (middle, radius)));
+                }
+            }
+        }
+    }
+    let (_, circle) = best?;
+    (0..3).try_fold(circle, |circle, _| refined(edge, circle))
+}
+
+/// The circle of least squares through the points that are near to one.
+///
+/// # Reference
+/// Kåsa 1976, IEEE Trans. Instrum. Meas. 25, 8: linear in the middle and in the difference of the squares of radius
+/// and distance.
+fn refined(points: &[[f64; 2]], (middle, radius): ([f64; 2], f64)) -> Option<([f64; 2], f64)> {
+    let off = (OFF_CIRCLE * radius).max(OFF_CIRCLE_PX);
+    let mut matrix = Matrix3::zeros();
+    let mut vector = Vector3::zeros();
+    for point in points {
+        let [x, y] = [point[0] - middle[0], point[1] - middle[1]];
+        if (libm::hypot(x, y) - radius).abs() < off {
+            let terms = Vector3::new(x, y, 1.0);
+            matrix += terms * terms.transpose();
+            vector += terms * (x * x + y * y);
+        }
+    }
+    let [twice_x, twice_y, rest] = matrix.cholesky()?.solve(&vector).into();
+    let (x, y) = (twice_x / 2.0, twice_y / 2.0);
+    let squared = rest + x * x + y * y;
+    (squared > 0.0).then(|| ([middle[0] + x, middle[1] + y], squared.sqrt()))
+}
+
+fn circle_through(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let ([bx, by], [cx, cy]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+    let twice_area = bx * cy - by * cx;
+    let (b_squared, c_squared) = (bx * bx + by * by, cx * cx + cy * cy);
+    let x = (cy * b_squared - by * c_squared) / (2.0 * twice_area);
+    let y = (bx * c_squared - cx * b_squared) / (2.0 * twice_area);
+    let radius = libm::hypot(x, y);
+    radius.is_finite().then_some(([a[0] + x, a[1] + y], radius))
+}
+
+impl<'a> Circle<'a> {
+    /// The circle on which most of a region's edge lies: of a crescent, the limb.
+    fn of_limb(region: &'a Shape, width: usize) -> Option<Self> {
+        let (middle, radius) = most_common_circle(&ends(region, width), region.extent())?;
+        let off = (OFF_CIRCLE * radius).max(OFF_CIRCLE_PX);
+        let reaches = reaches(region, middle, width);
+        let is_inside = reaches.iter().all(|reach| *reach < radius + 2.0 * off);
+        let limb = |reach: &&f64| (**reach - radius).abs() < off;
+        is_inside.then(|| Self {
+            region,
+            middle,
+            radius,
+            limb_parts: reaches.iter().filter(limb).count(),
+            least_parts: MIN_PARTS,
+        })
+    }
+
+    /// The circle that most directions agree about: spikes of a lamp go beyond it.
+    fn middling(region: &'a Shape, width: usize) -> Self {
+        let middle = region.middle;
+        let reaches = reaches(region, middle, width);
+        let radius = median(&mut reaches.clone());
+        let off = (2.0 * OFF_CIRCLE * radius).max(OFF_CIRCLE_PX);
+        let limb = |reach: &&f64| (**reach - radius).abs() < off;
+        Self {
+            region,
+            middle,
+            radius,
+            limb_parts: reaches.iter().filter(limb).count(),
+            least_parts: MOST_PARTS,
+        }
+    }
+
+    fn is_disc(&self, small: &Frame, [sky, full]: [f32; 2]) -> bool {
         let smallest = SMALLEST * small.width.max(small.height) as f64;
-        if 2.0 * self.radius < smallest || self.limb_parts(small.width) < MIN_PARTS {
+        if 2.0 * self.radius < smallest || self.limb_parts < self.least_parts {
             return false;
         }
         let inside = self.inside(small) - sky;
@@ -129,27 +220,6 @@ impl Circle {
         };
         let has_limb = left(1.15 + 1.5 / self.radius).is_some_and(|left| left < OUTSIDE);
         has_limb || is_saturated && left(2.0).is_some_and(|left| left < GLOW)
-    }
-
-    /// In how many of [`PARTS`] directions the region ends at the circle.
-    fn limb_parts(&self, width: usize) -> usize {
-        let mut reach = [0.0_f64; PARTS];
-        for [x, y] in places(&self.region, width) {
-            let [dx, dy] = [x - self.middle[0], y - self.middle[1]];
-            let part = self.part(libm::atan2(dy, dx));
-            reach[part] = reach[part].max(libm::hypot(dx, dy) + 0.5);
-        }
-        let off = (OFF_CIRCLE * self.radius).max(OFF_CIRCLE_PX);
-        reach
-            .iter()
-            .filter(|&&reach| reach > self.radius - off)
-            .count()
-    }
-
-    fn part(&self, angle_rad: f64) -> usize {
-        let turns = angle_rad / TAU;
-        let part = (turns - turns.floor()) * PARTS as f64;
-        (part as usize).min(PARTS - 1)
     }
 
     /// Median level of the region.
@@ -176,4 +246,17 @@ impl Circle {
             .collect();
         (levels.len() > PARTS / 8).then(|| median(&mut levels))
     }
+}
+
+/// How far a region reaches from a point in each of [`PARTS`] directions.
+fn reaches(region: &Shape, middle: [f64; 2], width: usize) -> Vec<f64> {
+    let mut reaches = vec![0.0_f64; PARTS];
+    for [x, y] in places(region, width) {
+        let [dx, dy] = [x - middle[0], y - middle[1]];
+        let turns = libm::atan2(dy, dx) / TAU;
+        let part = ((turns - turns.floor()) * PARTS as f64) as usize;
+        let reach = &mut reaches[part.min(PARTS - 1)];
+        *reach = reach.max(libm::hypot(dx, dy) + 0.5);
+    }
+    reaches
 }

@@ -1,8 +1,10 @@
 //! The picture that is looked at: the frame's light, reduced to few pixels.
 
+use super::shapes::{Shape, shapes};
 use crate::base::statistics::median;
 use crate::detect::BackgroundMap;
 use crate::frame::Frame;
+use std::cell::OnceCell;
 
 /// Most pixels that are looked at. Stars, letters and strokes of larger frames are larger, too.
 const MAX_PX: usize = 3_000_000;
@@ -30,6 +32,7 @@ pub(super) struct Light {
     /// Share of the frame's pixels that are equal to the next one and to the one below: nearly all in what a
     /// program draws, few where a detector has noise.
     pub flat_share: f64,
+    spots: OnceCell<Vec<Shape>>,
 }
 
 impl Light {
@@ -62,7 +65,35 @@ impl Light {
             sky,
             full: full.max(highest),
             flat_share: flat_share(frame),
+            spots: OnceCell::new(),
         }
+    }
+
+    /// Regions that are brighter than the background, or darker for a `sign` of -1, by more than a threshold. None
+    /// where they are a large part of the picture: that is no thing in it.
+    pub fn regions(&self, sign: f32, threshold: f32) -> Vec<Shape> {
+        const MOST: f64 = 0.25;
+        let are_in = || self.above.iter().map(|value| sign * value > threshold);
+        let count = are_in().filter(|&is| is).count();
+        if count as f64 > MOST * self.above.len() as f64 {
+            return Vec::new();
+        }
+        shapes(are_in(), self.frame.width)
+    }
+
+    /// Regions that are clearly brighter than the noise around them: stars, and whatever else shines.
+    pub fn spots(&self) -> &[Shape] {
+        /// Standard deviations of the noise.
+        const NOISE_SIGMA: f32 = 5.0;
+        self.spots
+            .get_or_init(|| self.regions(1.0, NOISE_SIGMA * self.noise))
+    }
+
+    /// The largest difference from the background, upwards or downwards.
+    pub fn contrast(&self, sign: f32) -> f32 {
+        self.above
+            .iter()
+            .fold(0.0, |most, value| most.max(sign * value))
     }
 
     /// Levels from dark to full scale.

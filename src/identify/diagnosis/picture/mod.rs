@@ -1,7 +1,7 @@
 //! What a picture shows in which no stars were identified: the Moon, star trails, a drawing, clouds, and so on.
 //!
 //! Each look has one criterion, of which its file says why it holds. The order goes from what nothing else looks
-//! like to what is left: writing, seams, day, trails, discs, strokes, aurora, black, clouds, few stars. Where none
+//! like to what is left: writing, seams, day, aurora, trails, discs, strokes, black, clouds, few stars. Where none
 //! holds, nothing is said: a wrong cause is worse than none.
 
 mod arcs;
@@ -46,7 +46,10 @@ impl Unexplained<'_> {
         match known {
             None => view.clear().or_else(|| view.likely()),
             Some(Diagnosis::Saturated { .. }) => view.written().or_else(|| view.drawn()),
-            Some(Diagnosis::Trails { .. }) => view.written().or_else(|| arcs::find(&view.light)),
+            Some(Diagnosis::Trails { .. }) => view
+                .written()
+                .or_else(|| view.aurora())
+                .or_else(|| arcs::find(&view.light)),
             Some(
                 Diagnosis::DoubleExposure(_)
                 | Diagnosis::Negative { .. }
@@ -86,6 +89,8 @@ impl<'a> View<'a> {
         self.written()
             .or_else(|| self.mosaic())
             .or_else(|| self.day())
+            // Its rays are long and thin, too.
+            .or_else(|| self.aurora())
             .or_else(|| arcs::find(&self.light))
             .or_else(|| self.out_of_focus())
             .or_else(|| self.disc())
@@ -94,8 +99,7 @@ impl<'a> View<'a> {
 
     /// What is likely where the stars were not identified.
     fn likely(&self) -> Option<Diagnosis> {
-        self.aurora()
-            .or_else(|| self.black())
+        self.black()
             .or_else(|| self.clouds())
             .or_else(|| self.few_stars())
     }

@@ -7,8 +7,12 @@ use crate::base::statistics::median;
 const ALONG_PX: usize = 16;
 /// A jump is so many standard deviations of what is between neighbors elsewhere.
 const JUMP_SIGMA: f32 = 6.0;
+const SIGMA_PER_STEP: f32 = 1.048;
+/// A jump is more than so many steps of levels, and than this share of the sky: JPEG files have small ones.
+const LEAST_STEPS: f32 = 1.5;
+const LEAST_SHARE: f32 = 0.03;
 /// A seam jumps along at least this share of its length.
-const SHARE: f64 = 0.6;
+const SHARE: f64 = 0.4;
 /// A seam is so far from the border, as a share of the side: nearer ones are of a frame around the picture.
 const FROM_BORDER: f64 = 0.1;
 /// Seams so near to each other are the two sides of one bar, as a share of the side.
@@ -18,60 +22,128 @@ const MOST: usize = 12;
 /// How uneven parallel seams may stand, as a share of the side.
 const UNEVEN: f64 = 0.03;
 
-/// How many pictures stand side by side and one below the other; `None` where it is one.
+/// How many pictures stand side by side and one below the other, at least; `None` where it is one.
 ///
 /// One seam may be a wall or the sea. Seams that cross, or several at even distances, are put together.
 pub(super) fn parts(light: &Light) -> Option<[usize; 2]> {
+    let values = light.frame.values();
     let (width, height) = (light.frame.width, light.frame.height);
-    let at = |x: usize, y: usize| light.frame.at(x, y);
-    let upright = seams([width, height], &at);
-    let level = seams([height, width], &|y, x| at(x, y));
+    let least =
+        LEAST_STEPS * light.frame.step_adu + LEAST_SHARE * (light.sky - light.lowest.min(0.0));
+    let upright = Axis {
+        across: width,
+        along: height,
+        strides: [1, width],
+    };
+    let level = Axis {
+        across: height,
+        along: width,
+        strides: [width, 1],
+    };
+    let [upright, level] = [upright, level].map(|axis| axis.seams(&values, least));
     let is_put_together = !upright.is_empty() && !level.is_empty()
         || upright.len().max(level.len()) >= 2 && [&upright, &level].iter().all(|s| are_even(s));
     let is_possible = upright.len().max(level.len()) < MOST;
     (is_put_together && is_possible).then(|| [upright.len() + 1, level.len() + 1])
 }
 
-/// Where seams cross the first of two axes, as shares of it.
-fn seams([across, along]: [usize; 2], at: &dyn Fn(usize, usize) -> f32) -> Vec<f64> {
-    let blocks = along / ALONG_PX;
-    if blocks < 4 {
-        return Vec::new();
-    }
-    let mut steps = vec![0.0_f32; blocks * (across - 1)];
-    for (block, steps) in steps.chunks_mut(across - 1).enumerate() {
-        let rows = block * ALONG_PX..(block + 1) * ALONG_PX;
-        for (x, step) in steps.iter_mut().enumerate() {
-            let sum: f32 = rows.clone().map(|y| at(x + 1, y) - at(x, y)).sum();
-            *step = (sum / ALONG_PX as f32).abs();
-        }
-    }
-    let usual = 1.48 * median(&mut steps.clone());
-    let least = (JUMP_SIGMA * usual).max(f32::MIN_POSITIVE);
-    let jumps = |x: usize| {
-        let count = (0..blocks)
-            .filter(|block| steps[block * (across - 1) + x] > least)
-            .count();
-        count as f64 / blocks as f64
-    };
-    let first = (FROM_BORDER * across as f64) as usize;
-    let found = (first..across - 1 - first).filter(|&x| jumps(x) > SHARE);
-    joined(found.map(|x| (x as f64 + 1.0) / across as f64))
+/// The direction across seams, and that along them.
+struct Axis {
+    across: usize,
+    along: usize,
+    /// From one pixel to the next, across and along.
+    strides: [usize; 2],
 }
 
-/// Seams that are near to each other as one.
-fn joined(places: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut joined: Vec<[f64; 2]> = Vec::new();
-    for place in places {
+impl Axis {
+    /// Where seams are, as shares of the side.
+    fn seams(&self, values: &[f32], least: f32) -> Vec<f64> {
+        let blocks = self.along / ALONG_PX;
+        if blocks < 4 {
+            return Vec::new();
+        }
+        let means: Vec<f32> = (0..blocks)
+            .flat_map(|block| self.means(values, block))
+            .collect();
+        let row = |block: usize| &means[block * self.across..(block + 1) * self.across];
+        let mut steps: Vec<f32> = means
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .collect();
+        let usual = SIGMA_PER_STEP * median(&mut steps);
+        let least = least.max(JUMP_SIGMA * usual);
+        let share = |is: &dyn Fn(&[f32]) -> bool| {
+            (0..blocks).filter(|&block| is(row(block))).count() as f64 / blocks as f64
+        };
+        let first = (FROM_BORDER * self.across as f64) as usize;
+        let jumps = |x: &usize| share(&|row| is_jump(row, *x, least)) > SHARE;
+        let places: Vec<usize> = (first.max(1)..self.across - first).filter(jumps).collect();
+        let sides = |[from, to]: &[usize; 2]| {
+            share(&|row| (side(row, *to, 1) - side(row, *from - 1, -1)).abs() > least) > SHARE
+        };
+        let bar = (BAR * self.across as f64) as usize;
+        let seams = joined(&places, bar).into_iter().filter(|ends| sides(ends));
+        seams
+            .map(|[from, to]| (from + to) as f64 / 2.0 / self.across as f64)
+            .collect()
+    }
+
+    /// The means of a block of pixels along the seams, across them.
+    fn means(&self, values: &[f32], block: usize) -> Vec<f32> {
+        let along = block * ALONG_PX..(block + 1) * ALONG_PX;
+        let value = |x: usize, y: usize| values[x * self.strides[0] + y * self.strides[1]];
+        let mut means = vec![0.0; self.across];
+        // Pixels beside each other in memory come one after the other.
+        if self.strides[0] == 1 {
+            for y in along {
+                for (x, mean) in means.iter_mut().enumerate() {
+                    *mean += value(x, y);
+                }
+            }
+        } else {
+            for (x, mean) in means.iter_mut().enumerate() {
+                *mean = along.clone().map(|y| value(x, y)).sum();
+            }
+        }
+        means.iter_mut().for_each(|mean| *mean /= ALONG_PX as f32);
+        means
+    }
+}
+
+/// Whether the level jumps between a pixel and the one before it, and hardly elsewhere around: texture and the blocks
+/// of JPEG files have many jumps.
+fn is_jump(row: &[f32], x: usize, least: f32) -> bool {
+    /// Places on either side.
+    const AROUND: usize = 20;
+    /// So many others may be as high: a bar between pictures has two sides.
+    const OTHERS: usize = 3;
+    let height = |x: usize| (row[x] - row[x - 1]).abs();
+    let jump = height(x);
+    if jump <= least {
+        return false;
+    }
+    let around = x.saturating_sub(AROUND).max(1)..(x + AROUND).min(row.len());
+    around.filter(|&other| height(other) > 0.5 * jump).count() <= OTHERS
+}
+
+/// The level on one side of a seam: the median of few pixels.
+fn side(row: &[f32], at: usize, direction: isize) -> f32 {
+    const PX: isize = 9;
+    let places = (0..PX).filter_map(|step| at.checked_add_signed(direction * step));
+    let levels = places.filter_map(|place| row.get(place).copied());
+    median(&mut levels.collect::<Vec<_>>())
+}
+
+/// Jumps that are near to each other as one seam, from its first to its last.
+fn joined(places: &[usize], bar: usize) -> Vec<[usize; 2]> {
+    let mut joined: Vec<[usize; 2]> = Vec::new();
+    for &place in places {
         match joined.last_mut() {
-            Some([_, last]) if place - *last < BAR => *last = place,
+            Some([_, last]) if place - *last <= bar => *last = place,
             _ => joined.push([place, place]),
         }
     }
     joined
-        .iter()
-        .map(|[first, last]| (first + last) / 2.0)
-        .collect()
 }
 
 fn are_even(seams: &[f64]) -> bool {

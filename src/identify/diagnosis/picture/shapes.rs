@@ -92,27 +92,25 @@ impl Shape {
     }
 }
 
-/// The 8-connected regions of the pixels in `mask`, in the order of their first pixels. Takes the pixels out of it.
-pub(super) fn shapes(mask: &mut [bool], width: usize) -> Vec<Shape> {
-    let mut shapes = Vec::new();
-    let mut waiting = Vec::new();
-    let original = mask.to_vec();
+/// A pixel that is not in a mask, one that waits, and one that is taken.
+const OUT: u8 = 0;
+const WAITS: u8 = 1;
+const TAKEN: u8 = 2;
+
+/// The 8-connected regions of the pixels that `are_in` a picture `width` wide, in the order of their first pixels.
+pub(super) fn shapes(are_in: impl Iterator<Item = bool>, width: usize) -> Vec<Shape> {
+    let mut mask: Vec<u8> = are_in.map(u8::from).collect();
+    let (mut shapes, mut waiting) = (Vec::new(), Vec::new());
     for start in 0..mask.len() {
-        if !mask[start] {
+        if mask[start] != WAITS {
             continue;
         }
-        let mut pixels = Vec::new();
-        let mut edge = 0;
-        mask[start] = false;
+        let (mut pixels, mut edge) = (Vec::new(), 0);
+        mask[start] = TAKEN;
         waiting.push(start);
         while let Some(index) = waiting.pop() {
             pixels.push(index as u32);
-            edge += usize::from(is_at_edge(&original, index, width));
-            for next in neighbors(index, width, mask.len()) {
-                if std::mem::take(&mut mask[next]) {
-                    waiting.push(next);
-                }
-            }
+            edge += usize::from(take_around(&mut mask, index, width, &mut waiting));
         }
         if pixels.len() >= MIN_PX {
             shapes.push(Shape::of(pixels, edge, width));
@@ -121,20 +119,23 @@ pub(super) fn shapes(mask: &mut [bool], width: usize) -> Vec<Shape> {
     shapes
 }
 
-/// The pixels around one.
-fn neighbors(index: usize, width: usize, count: usize) -> impl Iterator<Item = usize> {
-    let x = index % width;
-    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
-    let rows = (index / width).saturating_sub(1)..=(index / width + 1).min(count / width - 1);
-    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x))
-        .filter(move |&next| next != index)
-}
-
-/// Whether a pixel beside it, above it or below it is not in the mask.
-fn is_at_edge(mask: &[bool], index: usize, width: usize) -> bool {
-    let x = index % width;
-    let has = |next: Option<usize>| next.and_then(|next| mask.get(next)).is_some_and(|&is| is);
-    let left = x > 0 && has(index.checked_sub(1));
-    let right = x + 1 < width && has(Some(index + 1));
-    !(left && right && has(index.checked_sub(width)) && has(Some(index + width)))
+/// Takes the pixels around one that wait, and returns whether one beside it, above it or below it is not in the mask.
+fn take_around(mask: &mut [u8], index: usize, width: usize, waiting: &mut Vec<usize>) -> bool {
+    let (x, y) = (index % width, index / width);
+    let (last_x, last_y) = (width - 1, mask.len() / width - 1);
+    let mut is_edge = x == 0 || y == 0 || x == last_x || y == last_y;
+    for row in y.saturating_sub(1)..=(y + 1).min(last_y) {
+        for column in x.saturating_sub(1)..=(x + 1).min(last_x) {
+            let next = row * width + column;
+            match mask[next] {
+                WAITS => {
+                    mask[next] = TAKEN;
+                    waiting.push(next);
+                }
+                OUT => is_edge |= row == y || column == x,
+                _ => {}
+            }
+        }
+    }
+    is_edge
 }

@@ -83,37 +83,42 @@ pub(super) fn is_black(cells: &Cells, light: &Light, detections: &Detections) ->
         .fold(f32::MIN, |most, &level| most.max(level));
     let is_dark = light.sky - light.lowest.min(0.0) < BLACK * light.range();
     let is_even = highest - light.sky < EVEN * light.range();
-    is_dark
-        && is_even
-        && !detections
-            .sources
-            .iter()
-            .any(|s| is_bright_star(s) || s.flags.extended)
+    // JPEG files have spots of one level.
+    let is_thing = |source: &Detection| {
+        let stands_out = source.peak_adu > f64::from(3.0 * light.frame.step_adu);
+        stands_out && (is_bright_star(source) || source.flags.extended)
+    };
+    is_dark && is_even && !detections.sources.iter().any(is_thing)
 }
 
 /// By how much the brightness of the sky varies from place to place, over its level, where it is patchy as clouds make
 /// it: several brighter and darker patches are left beside a surface of second order, as twilight, the light of a city
 /// and the lens make it.
 pub(super) fn patchiness(cells: &Cells, light: &Light, detections: &Detections) -> Option<f64> {
-    /// Smallest variation.
+    /// Smallest variation, and largest: more is of a thing before a black ground.
     const LEAST: f64 = 0.08;
+    const MOST: f64 = 1.5;
     /// Fewest patches.
     const MIN_PATCHES: usize = 5;
-    /// Stars that clouds leave.
+    /// Detections that clouds leave, or that are of clouds.
     const MOST_STARS: usize = 25;
+    const MOST_SOURCES: usize = 60;
     /// Share of the picture that shows the sky.
     const SKY: f64 = 0.6;
-    let stars = detections
-        .sources
+    let sources = &detections.sources;
+    let stars = sources
         .iter()
-        .filter(|source| is_bright_star(source))
+        .filter(|source| source.flags.is_star_like())
         .count();
     let is_sky = |index: &usize| {
         let [x, y] = cells.middle_px(*index);
         detections.shows_sky(&PixelPoint::new(x, y))
     };
     let shown: Vec<usize> = (0..cells.levels.len()).filter(is_sky).collect();
-    if stars > MOST_STARS || (shown.len() as f64) < SKY * cells.levels.len() as f64 {
+    if stars > MOST_STARS
+        || sources.len() > MOST_SOURCES
+        || (shown.len() as f64) < SKY * cells.levels.len() as f64
+    {
         return None;
     }
     let left = without_surface(cells, &shown)?;
@@ -123,7 +128,9 @@ pub(super) fn patchiness(cells: &Cells, light: &Light, detections: &Detections) 
     let level = median_of(shown.iter().map(|&index| f64::from(cells.levels[index])))? - dark;
     let share = rms / level.max(f64::from(light.frame.step_adu));
     let is_above_noise = rms > f64::from(light.noise);
-    let is_patchy = share > LEAST && is_above_noise && patches(cells, &left, rms) >= MIN_PATCHES;
+    let is_patchy = (LEAST..MOST).contains(&share)
+        && is_above_noise
+        && patches(cells, &left, rms) >= MIN_PATCHES;
     is_patchy.then_some(share)
 }
 
@@ -132,8 +139,8 @@ fn patches(cells: &Cells, left: &[f64], rms: f64) -> usize {
     /// Smallest patch, in cells.
     const MIN_CELLS: f64 = 12.0;
     let count = |sign: f64| {
-        let mut mask: Vec<bool> = left.iter().map(|value| sign * value > 0.5 * rms).collect();
-        let regions = shapes(&mut mask, cells.columns);
+        let is_patch = left.iter().map(|value| sign * value > 0.5 * rms);
+        let regions = shapes(is_patch, cells.columns);
         regions
             .iter()
             .filter(|region| region.area() >= MIN_CELLS)

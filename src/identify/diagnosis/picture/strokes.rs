@@ -1,7 +1,7 @@
 //! Drawn lines: long strokes of one thickness that make up most of what stands out.
 
 use super::light::Light;
-use super::shapes::{Shape, shapes};
+use super::shapes::Shape;
 
 /// Ink is at least this share of the highest contrast, and above so many standard deviations of the noise.
 const INK: f32 = 0.3;
@@ -30,20 +30,14 @@ pub(super) fn are_drawn(light: &Light) -> bool {
 }
 
 fn has_strokes(light: &Light, sign: f32) -> bool {
-    let highest = light
-        .above
-        .iter()
-        .fold(0.0_f32, |most, value| most.max(sign * value));
-    let threshold = (INK * highest).max(NOISE_SIGMA * light.noise);
-    let mut mask: Vec<bool> = light.above.iter().map(|v| sign * v > threshold).collect();
-    let ink: f64 = mask.iter().filter(|&&is| is).count() as f64;
-    if ink > MOST_INK * mask.len() as f64 {
+    let threshold = (INK * light.contrast(sign)).max(NOISE_SIGMA * light.noise);
+    let regions = light.regions(sign, threshold);
+    let all: f64 = regions.iter().map(Shape::area).sum();
+    if all > MOST_INK * light.above.len() as f64 {
         return false;
     }
-    let regions = shapes(&mut mask, light.frame.width);
     let strokes: Vec<&Shape> = regions.iter().filter(|shape| is_stroke(shape)).collect();
     let area: f64 = strokes.iter().map(|shape| shape.area()).sum();
-    let all: f64 = regions.iter().map(Shape::area).sum();
     let length: f64 = strokes
         .iter()
         .map(|shape| shape.area() / shape.thickness())

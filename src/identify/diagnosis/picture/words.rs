@@ -1,7 +1,7 @@
 //! Words: letters of one size side by side, as in a text, on a screen, or beside the stars of a planetarium.
 
 use super::light::Light;
-use super::shapes::{Shape, shapes};
+use super::shapes::Shape;
 
 /// Letters are so high, in pixels.
 const HEIGHT_PX: std::ops::RangeInclusive<f64> = 5.0..=48.0;
@@ -34,14 +34,10 @@ pub(super) struct Writing {
 pub(super) fn read(light: &Light) -> Writing {
     let mut most = Writing::default();
     for sign in [1.0, -1.0] {
-        let highest = light
-            .above
-            .iter()
-            .fold(0.0_f32, |most, value| most.max(sign * value));
+        let contrast = light.contrast(sign);
         for share in INK {
-            let threshold = (share * highest).max(NOISE_SIGMA * light.noise);
-            let mut mask: Vec<bool> = light.above.iter().map(|v| sign * v > threshold).collect();
-            let found = writing(&shapes(&mut mask, light.frame.width), light);
+            let threshold = (share * contrast).max(NOISE_SIGMA * light.noise);
+            let found = writing(&light.regions(sign, threshold), light);
             if found.letters > most.letters {
                 most = found;
             }
