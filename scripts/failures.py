@@ -326,10 +326,7 @@ def drawings(rng):
     yield Drawn("drawing", "drawing-plot", picture)
 
 
-WORDS = (
-    "the night sky of winter shows many bright stars and their names are old in most of the languages that people "
-    "speak while a camera on a fixed mount sees them drift across its detector at a quarter of a degree a minute"
-).split()
+WORDS = ["the", "night", "sky", "of", "winter", "shows", "many", "bright", "stars", "and", "their", "names", "are", "old", "in", "most", "of", "the", "languages", "that", "people", "speak", "while", "a", "camera", "on", "a", "fixed", "mount", "sees", "them", "drift", "across", "its", "detector", "at", "a", "quarter", "of", "a", "degree", "a", "minute"]
 
 
 def write_lines(draw, rng, left, top, lines, step, letters, color, columns):
@@ -365,10 +362,7 @@ def texts(rng):
     yield Drawn("text", "text-editor-light", picture, ".jpg", quality=70)
 
 
-NAMES = (
-    "Sirius Canopus Arcturus Vega Capella Rigel Procyon Achernar Betelgeuse Hadar Altair Aldebaran Antares Spica "
-    "Pollux Fomalhaut Deneb Mimosa Regulus Adhara Castor Shaula Bellatrix Elnath Alnilam Alnair Alioth Dubhe"
-).split()
+NAMES = ["Sirius", "Canopus", "Arcturus", "Vega", "Capella", "Rigel", "Procyon", "Achernar", "Betelgeuse", "Hadar", "Altair", "Aldebaran", "Antares", "Spica", "Pollux", "Fomalhaut", "Deneb", "Mimosa", "Regulus", "Adhara", "Castor", "Shaula", "Bellatrix", "Elnath", "Alnilam", "Alnair", "Alioth", "Dubhe"]
 
 
 def planetariums(rng):

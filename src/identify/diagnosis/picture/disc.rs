@@ -26,7 +26,7 @@ const MOST_PARTS: usize = 48;
 /// It is above the sky by this share of full scale.
 const CONTRAST: f32 = 0.2;
 /// Share of its light that is left a little outside its limb, …
-const OUTSIDE: f32 = 0.3;
+const OUTSIDE: f32 = 0.15;
 /// … or at twice its radius, if it is saturated: a glow has no edge.
 const GLOW: f32 = 0.6;
 /// Level of a saturated disc over full scale.
@@ -259,4 +259,59 @@ fn reaches(region: &Shape, middle: [f64; 2], width: usize) -> Vec<f64> {
         *reach = reach.max(libm::hypot(dx, dy) + 0.5);
     }
     reaches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// The disc in a picture of 400 × 300 pixels of these levels.
+    fn found(level: impl Fn(f64, f64) -> f64) -> Option<Disc> {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let pixel = |index: usize| {
+            let level = level((index % 400) as f64, (index / 400) as f64);
+            (level + random.random_range(-2.0..2.0))
+                .clamp(0.0, 255.0)
+                .round() as f32
+        };
+        let frame = Frame::new(400, 300, (0..400 * 300).map(pixel).collect()).unwrap();
+        find(&Light::of(&frame.with_levels(1.0, Some(255.0))))
+    }
+
+    #[test]
+    fn a_phase_of_the_moon_has_the_limb_of_the_whole() {
+        // The terminator is half an ellipse: from a thin crescent to the full Moon.
+        for terminator in [0.6, 0.0, -0.5, -1.0] {
+            let is_lit = |x: f64, y: f64| {
+                let [u, v] = [(x - 180.0) / 60.0, (y - 140.0) / 60.0];
+                u * u + v * v < 1.0 && u > terminator * (1.0 - v * v).sqrt()
+            };
+            let disc = found(|x, y| if is_lit(x, y) { 150.0 } else { 10.0 });
+            let Disc {
+                middle_px: [x, y],
+                diameter_px,
+            } = disc.expect("a disc");
+            let off = libm::hypot(x - 180.0, y - 140.0);
+            assert!(
+                off < 4.0 && (diameter_px - 120.0).abs() < 8.0,
+                "{terminator}: {off} {diameter_px}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_has_no_limb_is_no_disc() {
+        let blob = |sigma: f64| {
+            move |x: f64, y: f64| {
+                let squared = (x - 200.0).powi(2) + (y - 150.0).powi(2);
+                10.0 + 150.0 * (-squared / (2.0 * sigma * sigma)).exp()
+            }
+        };
+        assert!(found(blob(2.0)).is_none() && found(blob(30.0)).is_none());
+        let window = |x: f64, y: f64| (x - 200.0).abs() < 30.0 && (y - 150.0).abs() < 20.0;
+        assert!(found(|x, y| if window(x, y) { 200.0 } else { 10.0 }).is_none());
+        assert!(found(|_, _| 20.0).is_none());
+    }
 }

@@ -154,3 +154,56 @@ fn are_even(seams: &[f64]) -> bool {
         .zip(expected)
         .all(|(seam, even)| (seam - even).abs() < UNEVEN)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Frame;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn found(level: impl Fn(usize, usize) -> f64) -> Option<[usize; 2]> {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let pixel = |index: usize| {
+            let noise = random.random_range(-3.0..3.0);
+            (level(index % 480, index / 480) + noise).round() as f32
+        };
+        let frame = Frame::new(480, 320, (0..480 * 320).map(pixel).collect()).unwrap();
+        parts(&Light::of(&frame.with_levels(1.0, Some(255.0))))
+    }
+
+    #[test]
+    fn pictures_side_by_side_are_counted() {
+        let quarters = |x: usize, y: usize| {
+            20.0 + 8.0 * f64::from(u8::from(x >= 200) + 2 * u8::from(y >= 170))
+        };
+        assert_eq!(found(quarters), Some([2, 2]));
+        // A bar divides them.
+        let barred = |x: usize, y: usize| {
+            if x.abs_diff(200) < 4 {
+                200.0
+            } else {
+                quarters(x, y)
+            }
+        };
+        assert_eq!(found(barred), Some([2, 2]));
+        let strip = |x: usize, _: usize| 20.0 + 10.0 * ((x / 160) % 2) as f64;
+        assert_eq!(found(strip), Some([3, 1]));
+    }
+
+    #[test]
+    fn a_roof_a_frame_and_a_grid_are_no_seams() {
+        assert_eq!(found(|_, y| if y > 150 { 60.0 } else { 20.0 }), None);
+        let border = |x: usize, y: usize| x < 20 || x >= 460 || y < 15 || y >= 305;
+        assert_eq!(found(|x, y| if border(x, y) { 0.0 } else { 30.0 }), None);
+        assert_eq!(
+            found(|x, y| if x % 80 == 0 || y % 80 == 0 {
+                90.0
+            } else {
+                20.0
+            }),
+            None
+        );
+        assert_eq!(found(|x, y| 20.0 + 0.1 * (x + y) as f64), None);
+    }
+}

@@ -139,3 +139,38 @@ fn take_around(mask: &mut [u8], index: usize, width: usize, waiting: &mut Vec<us
     }
     is_edge
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The regions of the `#` in a drawing.
+    fn drawn(rows: &[&str]) -> Vec<Shape> {
+        let pixels = rows.iter().flat_map(|row| row.chars());
+        shapes(pixels.map(|c| c == '#'), rows[0].len())
+    }
+
+    #[test]
+    fn regions_touch_at_corners_and_small_ones_are_left_out() {
+        let found = drawn(&["##...#", "..##..", "......", "#.####", "......"]);
+        assert_eq!(found.len(), 2);
+        assert_eq!(
+            (found[0].area(), found[0].width(), found[0].height()),
+            (4.0, 4.0, 2.0)
+        );
+        assert_eq!((found[1].area(), found[1].middle), (4.0, [3.5, 3.0]));
+        assert!(found[1].touches(6, 5) && (found[1].length - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_stroke_is_as_thick_as_its_edges_are_near() {
+        let line = drawn(&["..........", ".########.", ".########.", ".........."]);
+        assert_eq!((line[0].edge, line[0].thickness()), (16, 2.0));
+    }
+
+    #[test]
+    fn a_picture_full_of_pixels_is_one_region() {
+        let full = shapes((0..600).map(|_| true), 30);
+        assert_eq!((full.len(), full[0].area(), full[0].edge), (1, 600.0, 96));
+    }
+}

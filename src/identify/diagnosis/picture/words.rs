@@ -144,3 +144,62 @@ fn is_spread(words: &[Word], light: &Light) -> bool {
     }
     quarters.iter().filter(|&&has| has).count() >= 3
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Frame;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// A dark picture with bright letters `size` high whose left upper corners are at these places: an upright
+    /// stroke, and a foot.
+    fn picture(places: impl Iterator<Item = [usize; 2]>, size: usize) -> Light {
+        let mut levels = vec![20.0; 600 * 400];
+        for [left, top] in places {
+            for y in 0..size {
+                let end = if y + 2 < size { 2 } else { 2 * size / 3 };
+                for x in 0..end {
+                    levels[(top + y) * 600 + left + x] = 200.0;
+                }
+            }
+        }
+        Light::of(
+            &Frame::new(600, 400, levels)
+                .unwrap()
+                .with_levels(1.0, Some(255.0)),
+        )
+    }
+
+    #[test]
+    fn letters_side_by_side_are_words_and_words_stand_in_lines() {
+        for size in [8, 12, 20] {
+            // Words of six letters, in lines.
+            let letter = |index: usize| {
+                let (line, place) = (index / 12, index % 12);
+                [
+                    20 + place * (size - 2) + place / 6 * size,
+                    20 + line * 2 * size,
+                ]
+            };
+            let found = read(&picture((0..84).map(letter), size));
+            assert_eq!(
+                (found.words, found.letters, found.in_lines),
+                (14, 84, 14),
+                "{size}"
+            );
+        }
+    }
+
+    #[test]
+    fn strewn_spots_are_no_words() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for count in [30, 150, 400] {
+            let places: Vec<[usize; 2]> = (0..count)
+                .map(|_| [random.random_range(5..580), random.random_range(5..380)])
+                .collect();
+            let found = read(&picture(places.into_iter(), 7));
+            assert!(found.words <= count / 40, "{count}: {}", found.words);
+        }
+    }
+}
