@@ -29,6 +29,8 @@ const TOLERANCE_PX: f64 = 1.0;
 /// Share of the trails that run about the pole, and log10 of the greatest probability that as many do by chance.
 const AGREEING: f64 = 0.4;
 const LOG10_CHANCE: f64 = -6.0;
+/// All stars turn by one angle: the median difference from it, as a share.
+const SPREAD: f64 = 0.2;
 /// The mean of unit vectors at twice the angles of trails that are parallel: a pole is no longer told then.
 const PARALLEL: f64 = 0.985;
 
@@ -186,12 +188,13 @@ fn turn_rad(trails: &[&Shape], pole: [f64; 2], light: &Light) -> Option<f64> {
     let (width, height) = (light.frame.width, light.frame.height);
     let whole = || trails.iter().filter(|trail| !trail.touches(width, height));
     let longer = whole().count().div_ceil(2).max(3);
-    median_of(
-        whole()
-            .take(longer)
-            .filter_map(|trail| span_rad(trail, pole, width)),
-    )
-    .filter(|turn_rad| *turn_rad > 0.0)
+    let longer = whole().take(longer);
+    let spans: Vec<f64> = longer
+        .filter_map(|trail| span_rad(trail, pole, width))
+        .collect();
+    let turn_rad = median_of(spans.iter().copied())?;
+    let spread = median_of(spans.iter().map(|span| (span - turn_rad).abs()))?;
+    (turn_rad > 0.0 && spread < SPREAD * turn_rad).then_some(turn_rad)
 }
 
 /// The angle of an arc at the pole: the circle without the largest gap between its pixels.

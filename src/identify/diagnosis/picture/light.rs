@@ -29,6 +29,8 @@ pub(super) struct Light {
     pub full: f32,
     /// Standard deviation of a pixel, from its difference to its neighbor.
     pub noise: f32,
+    /// The step between levels of the frame.
+    pub step: f32,
     /// Share of the frame's pixels that are equal to the next one and to the one below: nearly all in what a
     /// program draws, few where a detector has noise.
     pub flat_share: f64,
@@ -64,6 +66,7 @@ impl Light {
             lowest,
             sky,
             full: full.max(highest),
+            step: frame.step_adu,
             flat_share: flat_share(frame),
             spots: OnceCell::new(),
         }
@@ -83,10 +86,11 @@ impl Light {
 
     /// Regions that are clearly brighter than the noise around them: stars, and whatever else shines.
     pub fn spots(&self) -> &[Shape] {
-        /// Standard deviations of the noise.
+        /// Standard deviations of the noise, and levels: blocks of JPEG files differ by one or two.
         const NOISE_SIGMA: f32 = 5.0;
-        self.spots
-            .get_or_init(|| self.regions(1.0, NOISE_SIGMA * self.noise))
+        const LEVELS: f32 = 3.5;
+        let threshold = (NOISE_SIGMA * self.noise).max(LEVELS * self.step);
+        self.spots.get_or_init(|| self.regions(1.0, threshold))
     }
 
     /// The largest difference from the background, upwards or downwards.

@@ -9,7 +9,7 @@ const ALONG_PX: usize = 16;
 const JUMP_SIGMA: f32 = 6.0;
 const SIGMA_PER_STEP: f32 = 1.048;
 /// A jump is more than so many steps of levels, and than this share of the sky: JPEG files have small ones.
-const LEAST_STEPS: f32 = 1.5;
+const LEAST_STEPS: f32 = 3.5;
 const LEAST_SHARE: f32 = 0.03;
 /// A seam jumps along at least this share of its length.
 const SHARE: f64 = 0.4;
@@ -28,8 +28,7 @@ const UNEVEN: f64 = 0.03;
 pub(super) fn parts(light: &Light) -> Option<[usize; 2]> {
     let values = light.frame.values();
     let (width, height) = (light.frame.width, light.frame.height);
-    let least =
-        LEAST_STEPS * light.frame.step_adu + LEAST_SHARE * (light.sky - light.lowest.min(0.0));
+    let least = LEAST_STEPS * light.step + LEAST_SHARE * (light.sky - light.lowest.min(0.0));
     let upright = Axis {
         across: width,
         along: height,
@@ -126,9 +125,9 @@ fn is_jump(row: &[f32], x: usize, least: f32) -> bool {
     around.filter(|&other| height(other) > 0.5 * jump).count() <= OTHERS
 }
 
-/// The level on one side of a seam: the median of few pixels.
+/// The level on one side of a seam: the median of several blocks of a JPEG file.
 fn side(row: &[f32], at: usize, direction: isize) -> f32 {
-    const PX: isize = 9;
+    const PX: isize = 28;
     let places = (0..PX).filter_map(|step| at.checked_add_signed(direction * step));
     let levels = places.filter_map(|place| row.get(place).copied());
     median(&mut levels.collect::<Vec<_>>())

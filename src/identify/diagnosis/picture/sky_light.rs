@@ -31,8 +31,10 @@ pub(super) fn is_day(
     const BLUE: f32 = 1.3;
     /// Share of the picture.
     const SHARE: f64 = 0.2;
-    /// Stars in it.
+    /// Stars in it: a blue nebula has many. They are above the noise, and by a share of full scale.
     const MOST_STARS: usize = 5;
+    const MIN_SNR: f64 = 10.0;
+    const PEAK: f32 = 0.1;
     let dark = light.lowest.min(0.0);
     let is_sky = |&[red, green, blue]: &Color| {
         let is_blue = blue - dark > BLUE * (red - dark) && blue > green;
@@ -40,10 +42,29 @@ pub(super) fn is_day(
         is_blue && level > BRIGHT * light.range()
     };
     let share = colors.iter().filter(|color| is_sky(color)).count() as f64 / colors.len() as f64;
-    let stars = detections.sources.iter().filter(|source| {
-        is_bright_star(source) && is_sky(&colors[cells.at(source.position.x, source.position.y)])
-    });
-    share > SHARE && stars.count() <= MOST_STARS
+    let is_star = |source: &&Detection| {
+        let stands_out = source.snr > MIN_SNR && source.peak_adu > f64::from(PEAK * light.range());
+        let is_point = !(source.flags.hot_pixel || source.flags.trail);
+        stands_out && is_point && is_sky(&colors[cells.at(source.position.x, source.position.y)])
+    };
+    let stars = detections.sources.iter().filter(is_star);
+    share > SHARE && stars.count() <= MOST_STARS && is_smooth(cells, |index| is_sky(&colors[index]))
+}
+
+/// Whether the level hardly changes from a cell of a part of the picture to the next: air is smooth, a nebula is not.
+fn is_smooth(cells: &Cells, is_part: impl Fn(usize) -> bool) -> bool {
+    /// Difference over the level, and the share of pairs that differ by less.
+    const DIFFERENCE: f32 = 0.06;
+    const SHARE: f64 = 0.7;
+    let is_pair = |index: &usize| {
+        index % cells.columns + 1 < cells.columns && is_part(*index) && is_part(index + 1)
+    };
+    let is_even = |index: &usize| {
+        let [level, next] = [index, &(index + 1)].map(|&index| cells.levels[index]);
+        (next - level).abs() < DIFFERENCE * level
+    };
+    let pairs = || (0..cells.levels.len()).filter(is_pair);
+    pairs().filter(is_even).count() as f64 >= SHARE * pairs().count() as f64
 }
 
 /// Whether light is added to the sky in a part of the picture that is green, as oxygen shines at 557.7 nm. What lamps
@@ -85,10 +106,10 @@ pub(super) fn is_black(cells: &Cells, light: &Light, detections: &Detections) ->
     let is_even = highest - light.sky < EVEN * light.range();
     // JPEG files have spots of one level.
     let is_thing = |source: &Detection| {
-        let stands_out = source.peak_adu > f64::from(3.0 * light.frame.step_adu);
-        stands_out && (is_bright_star(source) || source.flags.extended)
+        source.peak_adu > f64::from(3.0 * light.step)
+            && (is_bright_star(source) || source.flags.extended)
     };
-    is_dark && is_even && !detections.sources.iter().any(is_thing)
+    is_dark && is_even && light.spots().is_empty() && !detections.sources.iter().any(is_thing)
 }
 
 /// By how much the brightness of the sky varies from place to place, over its level, where it is patchy as clouds make
@@ -96,12 +117,12 @@ pub(super) fn is_black(cells: &Cells, light: &Light, detections: &Detections) ->
 /// and the lens make it.
 pub(super) fn patchiness(cells: &Cells, light: &Light, detections: &Detections) -> Option<f64> {
     /// Smallest variation, and largest: more is of a thing before a black ground.
-    const LEAST: f64 = 0.08;
+    const LEAST: f64 = 0.12;
     const MOST: f64 = 1.5;
     /// Fewest patches.
     const MIN_PATCHES: usize = 5;
     /// Detections that clouds leave, or that are of clouds.
-    const MOST_STARS: usize = 25;
+    const MOST_STARS: usize = 12;
     const MOST_SOURCES: usize = 60;
     /// Share of the picture that shows the sky.
     const SKY: f64 = 0.6;

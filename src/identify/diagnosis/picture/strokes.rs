@@ -36,7 +36,10 @@ fn has_strokes(light: &Light, sign: f32) -> bool {
     if all > MOST_INK * light.above.len() as f64 {
         return false;
     }
-    let strokes: Vec<&Shape> = regions.iter().filter(|shape| is_stroke(shape)).collect();
+    let [width, height] = [light.frame.width, light.frame.height];
+    // Bars along the border are of a frame around the picture.
+    let is_inside = |shape: &&Shape| is_stroke(shape) && !shape.touches(width, height);
+    let strokes: Vec<&Shape> = regions.iter().filter(is_inside).collect();
     let area: f64 = strokes.iter().map(|shape| shape.area()).sum();
     let length: f64 = strokes
         .iter()
