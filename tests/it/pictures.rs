@@ -4,7 +4,7 @@
 //! `scripts/failures.py` draws more of them, with text and JPEG artifacts.
 
 use crate::common::{Ran, starpipe};
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
