@@ -72,6 +72,7 @@ impl FrameReport {
             status: Status::NotIdentified,
             reason: None,
             reason_code: None,
+            best_log10_false_alarm: None,
             remedies: Vec::new(),
             attitude: None,
             apparent: None,
@@ -95,6 +96,7 @@ impl FrameReport {
             Outcome::NotIdentified(reason) => {
                 report.reason = Some(reason::text(reason, solution));
                 report.reason_code = Some(reason.code());
+                report.best_log10_false_alarm = reason.best_log10_false_alarm();
                 report.remedies = reason.remedies();
             }
             Outcome::Identified(identification) => {

@@ -47,6 +47,8 @@ pub struct FrameReport {
     pub reason_code: Option<&'static str>,
     /// What the frame shows, in one sentence, where it is identified.
     pub sentence: Option<String>,
+    /// log10 of the false-alarm probability of the best arrangement, where none was good enough.
+    pub best_log10_false_alarm: Option<f64>,
     /// Names of the options that may help where they are not identified.
     pub remedies: Vec<Remedy>,
     /// The attitude of the camera.

@@ -3,7 +3,7 @@
 use crate::base::format::decimals_for;
 use crate::base::units::DEG_PER_RAD;
 use crate::identify::diagnosis::{Diagnosis, Excluded};
-use crate::identify::{LOG10_FALSE_ALARM_LIMIT, ScaleSource, SearchFailure};
+use crate::identify::{ScaleSource, SearchFailure};
 use crate::solve::{Reason, Solution};
 
 /// `reason` as text.
@@ -17,14 +17,12 @@ pub(super) fn text(reason: &Reason, solution: &Solution) -> String {
 fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
     match failure {
         SearchFailure::TooFewStars { found, needed } => too_few(*found, *needed, solution),
-        SearchFailure::NoMatch {
-            best_log10_false_alarm,
-        } => no_match(*best_log10_false_alarm, solution),
-        SearchFailure::NotConfirmed { log10_false_alarm } => format!(
-            "an arrangement of catalogue stars matches the brightest detections (log10 false-alarm \
-             probability {log10_false_alarm:.1}), but not enough of the stars have a sure name in it; the \
-             field of view and the direction, where known, make it easier"
-        ),
+        SearchFailure::NoMatch { .. } => no_match(solution),
+        SearchFailure::NotConfirmed { .. } => {
+            "stars of the catalog match the brightest detections, but too few of the others confirm it; the field \
+             of view and the direction, where known, make it easier"
+                .to_owned()
+        }
         SearchFailure::Interrupted => {
             "there was no answer within the time limit of a frame".to_owned()
         }
@@ -64,7 +62,89 @@ fn cause_text(cause: &Diagnosis) -> String {
             narrowest_rad,
         } => too_narrow(*fov_x_rad, *source, *narrowest_rad),
         Diagnosis::HintsExclude(excluded) => excluded_text(excluded),
+        seen => picture_text(seen),
     }
+}
+
+/// What the picture shows instead of stars, and what helps.
+fn picture_text(cause: &Diagnosis) -> String {
+    match cause {
+        Diagnosis::StarTrails {
+            turn_rad,
+            center_px,
+            ..
+        } => star_trails(*turn_rad, *center_px),
+        Diagnosis::BrightDisc {
+            middle_px: [x, y],
+            diameter_px,
+        } => format!(
+            "a bright disc outshines the stars, as the Moon, the Sun or a lamp does: it is {diameter_px:.0} px wide, \
+             around ({x:.0}, {y:.0}); turn the camera away from it"
+        ),
+        Diagnosis::OutOfFocus { disc_px } => format!(
+            "the stars are out of focus: they are discs of about {disc_px:.0} px; focus by hand on a bright star"
+        ),
+        Diagnosis::Mosaic {
+            parts: [columns, rows],
+        } => format!(
+            "the frame is put together of pictures: seams divide it into {columns} × {rows} parts; give one of them \
+             at a time"
+        ),
+        Diagnosis::Clouds { variation } => format!(
+            "the brightness of the sky is patchy, as with clouds (it varies by {:.0} %), and few stars are seen; a \
+             clear sky is needed",
+            variation * 100.0
+        ),
+        Diagnosis::Labels { words } => format!(
+            "the picture is a chart or a planetarium's, with {words} words in it; give a photograph, or a view \
+             without labels and lines"
+        ),
+        Diagnosis::Black { hot_pixels } => black(*hot_pixels),
+        Diagnosis::FewStars { stars } => format!(
+            "only {stars} stars were found, too few to be sure which they are; a longer exposure or a wider field of \
+             view shows more"
+        ),
+        plain => plain_text(plain).to_owned(),
+    }
+}
+
+/// Causes without a number.
+fn plain_text(cause: &Diagnosis) -> &'static str {
+    match cause {
+        Diagnosis::Drawing => {
+            "the picture is a drawing, a text or a screen and no photograph; give a photograph of the night sky"
+        }
+        Diagnosis::Daylight => {
+            "the sky is bright and blue, as by day; take the picture at night, when stars are seen"
+        }
+        Diagnosis::Aurora => {
+            "the green light of an aurora hides the stars; a shorter exposure, or a part of the sky without it, \
+             shows them"
+        }
+        other => other.code(),
+    }
+}
+
+fn star_trails(turn_rad: f64, [x, y]: [f64; 2]) -> String {
+    /// The sky turns once in a sidereal day.
+    const MINUTES_PER_DEG: f64 = 23.934_47 * 60.0 / 360.0;
+    let turn_deg = turn_rad * DEG_PER_RAD;
+    let minutes = turn_deg * MINUTES_PER_DEG;
+    format!(
+        "the stars are trails around ({x:.0}, {y:.0}): the sky turned by about {turn_deg:.0}°, as it does in \
+         {minutes:.0} minutes; expose for seconds, or give one picture of the series"
+    )
+}
+
+fn black(hot_pixels: usize) -> String {
+    let hot = match hot_pixels {
+        0 => String::new(),
+        1 => " and 1 hot pixel".to_owned(),
+        _ => format!(" and {hot_pixels} hot pixels"),
+    };
+    format!(
+        "the picture is black, with nothing but noise{hot} in it; uncover the lens, or expose longer"
+    )
 }
 
 fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> String {
@@ -100,7 +180,7 @@ fn too_few(found: usize, needed: usize, solution: &Solution) -> String {
     format!("{found}{others} and at least {needed} are needed{help}")
 }
 
-fn no_match(best_log10: Option<f64>, solution: &Solution) -> String {
+fn no_match(solution: &Solution) -> String {
     let stars = solution
         .sources
         .iter()
@@ -110,17 +190,10 @@ fn no_match(best_log10: Option<f64>, solution: &Solution) -> String {
         all if all == stars => format!("the {all} detections"),
         all => format!("the {stars} detections of {all} that look like stars"),
     };
-    match best_log10.filter(|best| best.is_finite()) {
-        Some(best) => format!(
-            "no arrangement of catalogue stars matches {tried} beyond chance: the best has a log10 \
-             false-alarm probability of {best:.1}, and {LOG10_FALSE_ALARM_LIMIT:.0} is needed; the field of \
-             view and the direction, where known, make it easier"
-        ),
-        None => format!(
-            "no arrangement of catalogue stars matches {tried}; if this is the sky, the field of view and \
-             the direction, where known, make it easier"
-        ),
-    }
+    format!(
+        "{tried} match no part of the sky; if this is the sky, its field of view and its direction, where known, \
+         make it easier, and a telescope's narrow field needs a catalog with fainter stars"
+    )
 }
 
 fn trails_text(trails: usize, angle_rad: f64, length_px: f64) -> String {
@@ -215,8 +288,9 @@ mod tests {
             })
         };
         assert!(text_of(no_match(None), 12).contains("12 detections"));
-        assert!(text_of(no_match(Some(-6.34)), 12).contains("-6.3"));
-        assert!(!text_of(no_match(Some(f64::NAN)), 12).contains("NaN"));
+        assert!(!text_of(no_match(Some(-6.34)), 12).contains("6.3"));
+        assert_eq!(no_match(Some(-6.34)).best_log10_false_alarm(), Some(-6.34));
+        assert_eq!(no_match(Some(f64::NAN)).best_log10_false_alarm(), None);
     }
 
     #[test]

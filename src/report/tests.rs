@@ -52,11 +52,12 @@ fn unidentified() -> FrameReport {
         constellations: Vec::new(),
         annotations: Vec::new(),
         reason: Some(
-            "no arrangement of catalogue stars matches the 12 detections; if this is the sky, the field \
-             of view and the direction, where known, make it easier"
+            "the 12 detections match no part of the sky; if this is the sky, its field of view and its direction, \
+             where known, make it easier"
                 .into(),
         ),
         reason_code: Some("no_match"),
+        best_log10_false_alarm: Some(-3.5),
         remedies: vec![Remedy::Fov, Remedy::Near],
         attitude: None,
         apparent: None,
@@ -200,6 +201,7 @@ fn identified() -> FrameReport {
         status: Status::Identified,
         reason: None,
         reason_code: None,
+        best_log10_false_alarm: None,
         remedies: Vec::new(),
         apparent: Some(ApparentReport {
             aberration: true,

@@ -38,6 +38,7 @@ impl FrameReport {
             "picture",
             &format!("{} × {} px", self.width, self.height),
         ));
+        lines.extend(self.best_line().filter(|_| options.all_stars));
         lines.extend(self.attitude.iter().flat_map(attitude_lines));
         lines.extend(self.optics.iter().flat_map(optics_lines));
         lines.extend(self.matched.iter().map(residual_line));
@@ -84,6 +85,13 @@ impl FrameReport {
         let others = lines.map(|line| format!("  {line}"));
         let first = (name + &first).trim_end().to_owned();
         std::iter::once(first).chain(others).collect()
+    }
+
+    /// How close the best arrangement came, where none was good enough.
+    fn best_line(&self) -> Option<String> {
+        let best = self.best_log10_false_alarm?;
+        let text = format!("log10 false-alarm probability {best:.1}, -8 or less is needed");
+        Some(labelled("best match", &text))
     }
 
     fn faintest_line(&self, magnitude: &MagnitudeReport) -> String {

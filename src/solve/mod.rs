@@ -16,6 +16,7 @@ mod body_in_frame;
 mod bright_stars;
 mod context;
 mod error;
+mod explanation;
 mod fixed_camera;
 mod identification;
 mod named_options;

@@ -37,7 +37,8 @@ impl Reason {
     /// The options that may help.
     pub fn remedies(&self) -> Vec<Remedy> {
         match self {
-            Self::Search(SearchFailure::TooFewStars { .. }) => vec![Remedy::Sigma],
+            Self::Search(SearchFailure::TooFewStars { .. })
+            | Self::Diagnosis(Diagnosis::FewStars { .. }) => vec![Remedy::Sigma],
             Self::Search(SearchFailure::NoMatch { .. } | SearchFailure::NotConfirmed { .. }) => {
                 vec![Remedy::Fov, Remedy::Near]
             }
@@ -54,6 +55,20 @@ impl Reason {
             }
             Self::Diagnosis(_) => Vec::new(),
         }
+    }
+
+    /// log10 of the false-alarm probability of the best arrangement, where none was good enough.
+    pub fn best_log10_false_alarm(&self) -> Option<f64> {
+        let best = match *self {
+            Self::Search(SearchFailure::NoMatch {
+                best_log10_false_alarm,
+            }) => best_log10_false_alarm,
+            Self::Search(SearchFailure::NotConfirmed { log10_false_alarm }) => {
+                Some(log10_false_alarm)
+            }
+            _ => None,
+        };
+        best.filter(|best| best.is_finite())
     }
 
     /// Code for programs.

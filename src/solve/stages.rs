@@ -3,6 +3,7 @@
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
 use super::error::Error;
+use super::explanation::explained;
 use super::identification::{SecondImages, identify_stars, observation, through_air_or_not};
 use super::note::Note;
 use super::outcome::{Outcome, Reason};
@@ -23,6 +24,7 @@ use crate::detect::{
 };
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
+use crate::identify::diagnosis::Unexplained;
 use crate::identify::{Choices, Priors, ScalePrior, SearchFailure};
 use crate::photometry::PictureColors;
 use std::num::NonZeroUsize;
@@ -229,6 +231,7 @@ fn solve(
         priors,
         place_time,
     } = stars;
+    outcome = stage.explained(outcome, &detections, calibration);
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
@@ -323,6 +326,27 @@ impl StarSearch<'_, '_> {
         let trails = self.context.find_trails.then_some(()).map(found);
         clock.lap(Stage::Detect);
         trails
+    }
+
+    /// The outcome, with what the picture shows where the stars are not identified.
+    fn explained(
+        &self,
+        outcome: Outcome,
+        detections: &Detections,
+        calibration: Option<&Calibration>,
+    ) -> Outcome {
+        let (prepared, context, workspace) = (self.prepared, self.context, &*self.workspace);
+        let colors = || match colors_of(prepared, calibration, context, workspace)? {
+            PictureColors::RedAndBlue(frames) => Some(*frames),
+            // Those of a raw frame are not balanced: no sky is gray in them.
+            PictureColors::Raw(_) => None,
+        };
+        let picture = Unexplained {
+            frame: prepared.frame(),
+            detections,
+            colors: &colors,
+        };
+        explained(outcome, &picture, &workspace.detect)
     }
 
     /// Detects the stars; `None` if that was not done in time.

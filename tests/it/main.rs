@@ -39,6 +39,7 @@ mod orientation;
 mod output_files;
 mod pages;
 mod photometry;
+mod pictures;
 mod place_time;
 mod real_sky;
 mod repeated_sky;

@@ -50,6 +50,58 @@ pub enum Diagnosis {
     },
     /// Without the priors the stars are identified.
     HintsExclude(Box<Excluded>),
+    /// The stars are arcs about the celestial pole.
+    StarTrails {
+        /// Number of arcs.
+        trails: usize,
+        /// How far the sky turned during the exposure, in radians.
+        turn_rad: f64,
+        /// The point about which it turned, x and y, in pixels.
+        center_px: [f64; 2],
+    },
+    /// A bright disc outshines the stars: the Moon, the Sun or a lamp.
+    BrightDisc {
+        /// Its middle, x and y, in pixels.
+        middle_px: [f64; 2],
+        /// Its diameter, in pixels.
+        diameter_px: f64,
+    },
+    /// The stars are discs or rings.
+    OutOfFocus {
+        /// Their diameter, in pixels.
+        disc_px: f64,
+    },
+    /// Lines or text.
+    Drawing,
+    /// A sky with labels, as planetarium programs and charts show it.
+    Labels {
+        /// Number of words.
+        words: usize,
+    },
+    /// Several pictures side by side.
+    Mosaic {
+        /// How many of them stand beside each other, and one below the other.
+        parts: [usize; 2],
+    },
+    /// A blue sky, as by day.
+    Daylight,
+    /// Green light of an aurora.
+    Aurora,
+    /// The brightness of the sky varies as with clouds.
+    Clouds {
+        /// Its variation over its level: one standard deviation.
+        variation: f64,
+    },
+    /// Nothing but noise, near the lowest levels.
+    Black {
+        /// Number of hot pixels.
+        hot_pixels: usize,
+    },
+    /// There are stars, but too few to be sure which they are.
+    FewStars {
+        /// Number of detections that look like stars.
+        stars: usize,
+    },
 }
 
 /// A pattern of stars that occurs twice. `Display` says how often, and how far apart.
@@ -100,6 +152,17 @@ impl Diagnosis {
             Self::DoubleExposure(_) => "double_exposure",
             Self::TooNarrow { .. } => "too_narrow",
             Self::HintsExclude(_) => "hints_exclude",
+            Self::StarTrails { .. } => "star_trails",
+            Self::BrightDisc { .. } => "bright_disc",
+            Self::OutOfFocus { .. } => "out_of_focus",
+            Self::Drawing => "drawing",
+            Self::Labels { .. } => "labels",
+            Self::Mosaic { .. } => "mosaic",
+            Self::Daylight => "daylight",
+            Self::Aurora => "aurora",
+            Self::Clouds { .. } => "clouds",
+            Self::Black { .. } => "black",
+            Self::FewStars { .. } => "too_few_stars",
         }
     }
 }

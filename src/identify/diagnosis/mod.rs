@@ -10,18 +10,22 @@
 //! 4. Most of the sources are trails in one direction.
 //! 5. The same pattern of stars occurs twice.
 //!
+//! Where none of them holds, and where the picture clearly shows another, [`picture`] says what it shows instead.
+//!
 //! It costs time only where a frame was not identified. The search without the priors takes
 //! longest: as long as any search with nothing known.
 
 mod cause;
 mod doubles;
 mod levels;
+mod picture;
 mod repeats;
 mod trails;
 
 pub use cause::DoubleImage;
 pub use cause::{Diagnosis, Excluded};
 pub(crate) use doubles::find_unnamed as find_double_image;
+pub(crate) use picture::{Unexplained, bytes as picture_bytes};
 pub use repeats::{RepeatedSky, find as find_repeated_sky};
 
 use crate::camera::focal_length_px;
