@@ -28,6 +28,8 @@ pub(crate) struct VisibleConstellation {
     pub figure_share: f64,
     /// Light of its conspicuous stars in the frame, in stars of magnitude 0.
     pub light: f64,
+    /// The share of the light of all its conspicuous stars that is in the frame.
+    pub light_share: f64,
     /// The centre of what is seen of it.
     pub middle: Option<PixelPoint>,
 }
@@ -71,15 +73,15 @@ pub(super) fn visible(view: &View<'_>) -> Vec<VisibleConstellation> {
 }
 
 /// What the frame shows at places spread evenly over it, and its conspicuous stars.
-struct Places {
+struct Places<'a> {
     /// Where the sky is seen, and the constellation there.
     sky: Vec<(PixelPoint, &'static str)>,
-    /// Conspicuous stars: constellation and light.
-    stars: Vec<(&'static str, f64)>,
+    /// All conspicuous stars: constellation, light, and whether the frame shows them.
+    stars: Vec<(&'a str, f64, bool)>,
 }
 
-impl Places {
-    fn of(view: &View<'_>) -> Self {
+impl<'a> Places<'a> {
+    fn of(view: &View<'a>) -> Self {
         let camera = &view.found.camera;
         let [columns, rows] = PLACES;
         let along = |count: usize, at: usize, px: f64| (at as f64 + 0.5) / count as f64 * px - 0.5;
@@ -97,12 +99,18 @@ impl Places {
         let stars = (0..catalog.brighter_than(CONSPICUOUS_MAG)).map(StarIndex::new);
         let axis = view.found.icrs_to_camera.boresight();
         let cos_radius = libm::cos(camera.radius_rad());
-        let stars = stars.map(|index| catalog.star(index)).filter_map(|star| {
+        let stars = stars.filter_map(|index| {
+            let star = catalog.star(index);
+            // Their designations name the constellation: `19 bet Ori`.
+            let constellation = catalog.name_of(index)?.split(' ').next_back()?;
             let is_near = axis.dot(&star.direction) > cos_radius;
-            let place = view.found.pixel_of(&star.direction).filter(|_| is_near)?;
+            let place = view.found.pixel_of(&star.direction).filter(|_| is_near);
             let light = libm::pow(10.0, -0.4 * f64::from(star.v_mag));
-            view.shows(&place)
-                .then(|| (constellation_at(&star.direction), light))
+            Some((
+                constellation,
+                light,
+                place.is_some_and(|place| view.shows(&place)),
+            ))
         });
         Self {
             sky: sky.collect(),
@@ -123,12 +131,9 @@ impl Places {
             .filter(|(_, name)| is_it(name))
             .map(|(place, _)| *place)
             .collect();
-        let light: f64 = self
-            .stars
-            .iter()
-            .filter(|(name, _)| is_it(name))
-            .map(|(_, light)| light)
-            .sum();
+        let own = self.stars.iter().filter(|(name, ..)| is_it(name));
+        let all: f64 = own.clone().map(|(_, light, _)| light).sum();
+        let light: f64 = own.filter(|star| star.2).map(|(_, light, _)| light).sum();
         if places.is_empty() && light == 0.0 {
             return None;
         }
@@ -158,6 +163,7 @@ impl Places {
             share: places.len() as f64 / self.sky.len().max(1) as f64,
             figure_share: on_figure.len() as f64 / points.len().max(1) as f64,
             light,
+            light_share: if all > 0.0 { light / all } else { 0.0 },
             middle,
         })
     }

@@ -37,14 +37,15 @@ pub(super) fn of(
 
 /// The most conspicuous constellations in the frame; the one that it lies in, where it shows none of them.
 fn shown_constellations(constellations: &[VisibleConstellation]) -> String {
-    /// A figure is shown where this much of it is in the frame, …
+    /// A constellation is shown where this much of its figure is in the frame, or of the light of its stars, …
     const SHOWN: f64 = 0.6;
+    const SHOWN_LIGHT: f64 = 0.7;
     /// … and named where its stars give this much of the light of the most conspicuous one's.
     const MIN_LIGHT: f64 = 0.15;
     const MOST: usize = 3;
     let mut shown: Vec<&VisibleConstellation> = constellations
         .iter()
-        .filter(|seen| seen.figure_share >= SHOWN)
+        .filter(|seen| seen.figure_share >= SHOWN || seen.light_share >= SHOWN_LIGHT)
         .collect();
     shown.sort_by(|a, b| b.light.total_cmp(&a.light));
     let most_light = shown.first().map_or(0.0, |first| first.light);

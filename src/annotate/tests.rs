@@ -29,7 +29,7 @@ fn source(position: PixelPoint, v_mag: f32, flags: DetectionFlags) -> Source {
 /// are named, the others are saturated and lie `off_px` to the right of their place.
 fn orion(off_px: f64, is_named: impl Fn(&str) -> bool) -> Solution {
     let catalog = Catalog::built_in();
-    let centre = UnitVector::from_ra_dec(84.0 * RAD_PER_DEG, -1.0 * RAD_PER_DEG);
+    let centre = UnitVector::from_ra_dec(84.0 * RAD_PER_DEG, -RAD_PER_DEG);
     let focal_px = focal_length_px(SIZE_PX[0], 30.0 * RAD_PER_DEG);
     let mut found = Identification {
         camera: CameraModel::pinhole(SIZE_PX[0], SIZE_PX[1], focal_px, false),

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
 mod accuracy;
+mod annotations;
 mod apparent;
 mod archive;
 mod brightest_stars;

@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn a_roof_a_frame_and_a_grid_are_no_seams() {
         assert_eq!(found(|_, y| if y > 150 { 60.0 } else { 20.0 }), None);
-        let border = |x: usize, y: usize| x < 20 || x >= 460 || y < 15 || y >= 305;
+        let border = |x: usize, y: usize| !(20..460).contains(&x) || !(15..305).contains(&y);
         assert_eq!(found(|x, y| if border(x, y) { 0.0 } else { 30.0 }), None);
         assert_eq!(
             found(|x, y| if x % 80 == 0 || y % 80 == 0 {
