@@ -74,7 +74,7 @@ def draw(
     if picture is not None:
         _show(ax, *picture)
     _mark(ax, result, rings, names)
-    if rings != "none":
+    if names > 0:
         _annotate(ax, result)
     ax.set_xlim(-0.5, columns - 0.5)
     ax.set_ylim(*((-0.5, rows - 0.5) if result._is_bottom_up else (rows - 0.5, -0.5)))
@@ -91,7 +91,7 @@ def draw(
 
 
 def _annotate(ax: Axes, result: Drawn) -> None:
-    """Write constellations, and the stars that are at their place and not measured."""
+    """Write constellations, and in italics the stars that were not measured at their place."""
     from matplotlib.patheffects import withStroke
 
     outline = [withStroke(linewidth=2.0, foreground="black")]
@@ -99,11 +99,15 @@ def _annotate(ax: Axes, result: Drawn) -> None:
     for shown in result.annotations:
         place, label = (shown["x"], shown["y"]), shown["label"]
         if shown["kind"] == "constellation":
-            ax.annotate(label, place, ha="center", va="center", color="#bbc3df", fontsize=10, **look)
+            ax.annotate(
+                label, place, ha="center", va="center", color="#bbc3df", fontsize=10, **look
+            )
         elif shown["kind"] == "star" and shown["why"] is not None:
-            ring = {"facecolors": "none", "edgecolors": "#96e1cd", "linestyles": "dashed"}
-            ax.scatter(*place, s=150.0, marker="o", linewidths=1.0, **ring)
-            offset = {"xytext": (8, 8), "textcoords": "offset points"}
+            offset: dict[str, Any] = {
+                "xytext": (8, 8),
+                "textcoords": "offset points",
+                "style": "italic",
+            }
             ax.annotate(label, place, color="#c9efe4", fontsize=8, **offset, **look)
 
 

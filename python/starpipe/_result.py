@@ -211,17 +211,17 @@ class Result(Attitude):
 
     @property
     def sentence(self) -> str | None:
-        """What the frame shows: constellations, famous objects, the size of the field; ``None`` if not identified."""
+        """What the frame shows, in one sentence; ``None`` if it is not identified."""
         return self._report["sentence"]  # type: ignore[no-any-return]
 
     @property
     def constellations(self) -> list[dict[str, Any]]:
-        """The constellations in the frame, largest share first: the `constellations` of the JSON."""
+        """Constellations in the frame, largest share first: the `constellations` of the JSON."""
         return self._report["constellations"]  # type: ignore[no-any-return]
 
     @property
     def annotations(self) -> list[dict[str, Any]]:
-        """What has a name in the frame, by its pose: the `annotations` of the JSON, pixels as in `stars`.
+        """What has a name in the frame: the `annotations` of the JSON, pixels as in `stars`.
 
         Bright stars are among them whether they were measured or not; ``why`` says why not.
         """

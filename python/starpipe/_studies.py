@@ -95,7 +95,8 @@ def validate(
 ) -> Validation:
     """Simulate frames at random attitudes, solve them, and compare them with the truth.
 
-    All rows are kept in memory; ``starpipe validate`` writes them to files, and continues interrupted runs.
+    All rows are kept in memory; ``starpipe validate`` writes them to files, and continues
+    interrupted runs.
 
     Parameters
     ----------

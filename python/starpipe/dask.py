@@ -222,9 +222,7 @@ def _claim(job: _Job, plan: _starpipe.ArchivePlan) -> None:
     if not _again(lambda: filesystem.exists(path)):
         for table in TABLES:
             if _again(lambda table=table: filesystem.exists(f"{root}/{table}")):  # type: ignore[misc]
-                raise ValueError(
-                    f"{job.out} has {table} but no archive.json: its run is unknown"
-                )
+                raise ValueError(f"{job.out} has {table} but no archive.json: its run is unknown")
         _write(filesystem, path, plan.identity.encode(), is_new=True)
     found = _again(lambda: filesystem.cat_file(path)).decode()
     differences = _starpipe.archive_differences(found, plan.identity)

@@ -19,8 +19,8 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
         SearchFailure::TooFewStars { found, needed } => too_few(*found, *needed, solution),
         SearchFailure::NoMatch { .. } => no_match(solution),
         SearchFailure::NotConfirmed { .. } => {
-            "stars of the catalog match the brightest detections, but too few of the others confirm it; the field \
-             of view and the direction, where known, make it easier"
+            "stars of the catalog match the brightest detections, but too few of the others confirm it; state the \
+             field of view and the direction if you know them"
                 .to_owned()
         }
         SearchFailure::Interrupted => {
@@ -96,7 +96,7 @@ fn picture_text(cause: &Diagnosis) -> String {
             variation * 100.0
         ),
         Diagnosis::Labels { words } => format!(
-            "the picture is a chart or a planetarium's, with {words} words in it; give a photograph, or a view \
+            "the picture looks like a chart or a planetarium program, with {words} words in it; give a photograph, or a view \
              without labels and lines"
         ),
         Diagnosis::Black { hot_pixels } => black(*hot_pixels),
@@ -112,7 +112,7 @@ fn picture_text(cause: &Diagnosis) -> String {
 fn plain_text(cause: &Diagnosis) -> &'static str {
     match cause {
         Diagnosis::Drawing => {
-            "the picture is a drawing, a text or a screen and no photograph; give a photograph of the night sky"
+            "the picture looks like a drawing, a text or a screenshot; give a photograph of the night sky"
         }
         Diagnosis::Daylight => {
             "the sky is bright and blue, as by day; take the picture at night, when stars are seen"
@@ -154,8 +154,8 @@ fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> S
         ScaleSource::Header => "by the file's header",
     };
     format!(
-        "the field of view {stated}, {} wide, is too narrow for the stars of this catalogue, which identify \
-         fields from {} on; one with fainter stars is needed",
+        "the field of view {stated}, {} wide, is too narrow for the stars of this catalog, which identify \
+         fields from {} on; a catalog with fainter stars is needed",
         range(fov_x_rad),
         degrees(narrowest_rad),
     )
@@ -191,8 +191,8 @@ fn no_match(solution: &Solution) -> String {
         all => format!("the {stars} detections of {all} that look like stars"),
     };
     format!(
-        "{tried} match no part of the sky; if this is the sky, its field of view and its direction, where known, \
-         make it easier, and a telescope's narrow field needs a catalog with fainter stars"
+        "{tried} match no part of the sky; if this is the sky, state the field of view and the direction if you know \
+         them; the narrow field of a telescope needs a catalog with fainter stars"
     )
 }
 

@@ -147,7 +147,11 @@ fn text_names_the_stars_and_json_and_csv_agree_with_it() {
     let frame = orion();
     let report = run(&["process", text(&frame)]);
     assert_eq!((report.status, report.stderr.as_str()), (0, ""));
-    assert!(report.stdout.contains("identified: "), "{}", report.stdout);
+    assert!(
+        report.stdout.contains("\n  identified  "),
+        "{}",
+        report.stdout
+    );
     let json = run(&["process", "--format", "json", text(&frame)]).reports();
     let stars = json[0]["stars"].as_array().unwrap();
     assert_eq!(number(&json[0], "/match/detected") as usize, stars.len());

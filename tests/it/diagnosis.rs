@@ -32,6 +32,9 @@ fn reason(path: &Path, options: &[&str]) -> (String, String) {
     let (code, text) = (word("reason_code"), word("reason"));
     let mut command = starpipe();
     let for_people = Ran::new(command.arg("process").args(options).arg(path)).stdout;
+    // Lines are broken where they are full.
+    let words: Vec<&str> = for_people.split_whitespace().collect();
+    let for_people = words.join(" ");
     let beginning: String = text.chars().take(30).collect();
     assert!(
         for_people.contains(&format!("not identified: {beginning}")),

@@ -213,11 +213,8 @@ fn odd_names_break_no_line_and_reach_no_terminal() {
 
     let text = of("text", &paths);
     assert!(!text.contains(|c: char| c.is_control() && c != '\n'));
-    assert!(text.contains("two\\nlines.png  640 × 480 px\n"), "{text}");
-    assert!(
-        text.contains("clear\\u{1b}[2J\\u{9b}31m.png  640"),
-        "{text}"
-    );
+    assert!(text.contains("two\\nlines.png: "), "{text}");
+    assert!(text.contains("clear\\u{1b}[2J\\u{9b}31m.png: "), "{text}");
 }
 
 #[test]
