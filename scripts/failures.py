@@ -27,7 +27,8 @@ FONTS = ("DejaVuSans.ttf", "DejaVuSerif.ttf", "DejaVuSansMono.ttf", "LiberationS
 # random dots do.
 RIGHT = {
     "moon": {"bright_disc"},
-    "veiled-moon": {"bright_disc", "clouds"},
+    # Behind clouds, the disc may have no edge, and the clouds no patches beside it.
+    "veiled-moon": {"bright_disc", "clouds", "too_few_stars"},
     "sun": {"bright_disc", "daylight"},
     "lamp": {"bright_disc"},
     "startrails": {"star_trails"},

@@ -87,8 +87,8 @@ fn picture_text(cause: &Diagnosis) -> String {
         Diagnosis::Mosaic {
             parts: [columns, rows],
         } => format!(
-            "the frame is put together of pictures: seams divide it into {columns} × {rows} parts; give one of them \
-             at a time"
+            "the frame is put together of pictures: seams divide it into {columns} × {rows} parts or more; give one \
+             of them at a time"
         ),
         Diagnosis::Clouds { variation } => format!(
             "the brightness of the sky is patchy, as with clouds (it varies by {:.0} %), and few stars are seen; a \

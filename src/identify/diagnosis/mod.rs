@@ -10,7 +10,7 @@
 //! 4. Most of the sources are trails in one direction.
 //! 5. The same pattern of stars occurs twice.
 //!
-//! Where none of them holds, and where the picture clearly shows another, [`picture`] says what it shows instead.
+//! Where none of them holds, and where the picture clearly shows another, `picture` says what it shows instead.
 //!
 //! It costs time only where a frame was not identified. The search without the priors takes
 //! longest: as long as any search with nothing known.

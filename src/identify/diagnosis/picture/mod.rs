@@ -45,7 +45,10 @@ impl Unexplained<'_> {
         let view = View::new(self);
         match known {
             None => view.clear().or_else(|| view.likely()),
-            Some(Diagnosis::Saturated { .. }) => view.written().or_else(|| view.drawn()),
+            Some(Diagnosis::Saturated { .. }) => view
+                .written()
+                .or_else(|| view.aurora())
+                .or_else(|| view.drawn()),
             Some(Diagnosis::Trails { .. }) => view
                 .written()
                 .or_else(|| view.aurora())

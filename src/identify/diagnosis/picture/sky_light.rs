@@ -121,7 +121,7 @@ pub(super) fn patchiness(cells: &Cells, light: &Light, detections: &Detections) 
     const MOST: f64 = 1.5;
     /// Fewest patches.
     const MIN_PATCHES: usize = 5;
-    /// Detections that clouds leave, or that are of clouds.
+    /// Stars that clouds leave, and detections, some of them of clouds.
     const MOST_STARS: usize = 12;
     const MOST_SOURCES: usize = 60;
     /// Share of the picture that shows the sky.
@@ -129,7 +129,7 @@ pub(super) fn patchiness(cells: &Cells, light: &Light, detections: &Detections) 
     let sources = &detections.sources;
     let stars = sources
         .iter()
-        .filter(|source| source.flags.is_star_like())
+        .filter(|source| is_bright_star(source))
         .count();
     let is_sky = |index: &usize| {
         let [x, y] = cells.middle_px(*index);
