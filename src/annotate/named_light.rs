@@ -106,8 +106,8 @@ impl<'a> Lights<'a> {
 
     /// Whether light may be that of a star; what was measured of a saturated or extended spot may be little.
     fn is_bright_enough(&self, source: &Source, v_mag: f32, why: Unmeasured) -> bool {
-        /// Tone curves, clouds and the edge of a lens make stars fainter by up to this.
-        const FAINTER_MAG: f64 = 2.5;
+        /// Tone curves, clouds, and low altitudes make stars fainter by up to this.
+        const FAINTER_MAG: f64 = 4.0;
         let found = mag_of(source).zip(self.zero_point_mag);
         let found = found.map(|(mag, zero_point_mag)| mag + zero_point_mag);
         let is_partial = matches!(why, Unmeasured::Saturated | Unmeasured::Extended);
