@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(names(&on(2023, 12, 30)), ["Quadrantids"]);
         assert_eq!(names(&on(2024, 1, 3)), ["Quadrantids"]);
         assert_eq!(names(&on(2024, 3, 10)), [""; 0]);
-        assert_eq!(names(&on(2024, 8, 12)).len(), 4);
+        assert_eq!(names(&on(2024, 8, 12)).len(), 3);
     }
 
     #[test]

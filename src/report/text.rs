@@ -114,7 +114,7 @@ impl FrameReport {
                 let zone = if is_assumed { "" } else { " UTC" };
                 let utc = date.iso.replace('T', " ").replace('Z', zone);
                 let offset = offset_text(date);
-                format!("{utc}, {source}{offset}: star positions for that date")
+                format!("{utc}, {source}{offset}: positions of that date")
             }
             None => {
                 let see = names.see(&[Remedy::Date]);
@@ -124,7 +124,7 @@ impl FrameReport {
                     }
                     Status::NotIdentified => "",
                 };
-                format!("unknown: star positions of J2000.0{error}{see}")
+                format!("unknown: positions of J2000.0{error}{see}")
             }
         };
         labelled("date", &text)

@@ -109,7 +109,7 @@ mod tests {
         let claim = || claim(directory.path(), RUN, &identity, || false);
         fs::write(directory.path().join("stars.csv"), "").unwrap();
         let error = claim().unwrap_err().to_string();
-        assert!(error.contains("stars.csv and no run.json"), "{error}");
+        assert!(error.contains("stars.csv but no run.json"), "{error}");
         fs::write(directory.path().join("run.json"), "{").unwrap();
         assert!(matches!(claim(), Err(StoreError::Damaged(_))));
     }

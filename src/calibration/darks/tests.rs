@@ -177,7 +177,7 @@ fn a_noise_that_the_grey_levels_hide_is_not_given() {
     assert_eq!(found.read_noise_adu, None);
     assert_eq!(
         found.report().missing["read_noise"],
-        "the noise is less than half the step between grey levels"
+        "the noise is less than half the step between gray levels"
     );
     assert!(found.hot_pixels.is_empty());
 }

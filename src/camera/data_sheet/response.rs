@@ -280,7 +280,7 @@ mod tests {
             ("nm,qe\n400,0.2\n", "1 rows of wavelength and value"),
             (
                 "nm;qe\n400;0.2\n500;0.3\n",
-                "line 2: '400;0.2' where a wavelength in nanometres, before a comma, was",
+                "line 2: '400;0.2' where a wavelength in nanometers, before a comma, was",
             ),
         ] {
             let error = parsed(text).unwrap_err().to_string();
