@@ -77,14 +77,14 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     process(night, "out", &[]);
     let before = files(&night.join("out"));
     for (options, difference) in [
-        (&["--sigma", "6"][..], "sigma is null there and 6.0 here"),
+        (&["--sigma", "6"][..], "sigma is null there, but 6.0 here"),
         (
             &["--max-stars", "20"],
-            "max_stars is 20000 there and 20 here",
+            "max_stars is 20000 there, but 20 here",
         ),
         (
             &["--dark", "frames/2020-03-01T200000.tif"],
-            "dark is null there and \"",
+            "dark is null there, but \"",
         ),
     ] {
         let refused = process(night, "out", options);
@@ -95,7 +95,7 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     let refused = process(night, "out", &[]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("frames is 3 there and 2 here"),
+        refused.stderr.contains("frames is 3 there, but 2 here"),
         "{}",
         refused.stderr
     );

@@ -346,7 +346,7 @@ fn what_cannot_be_exported_does_not_cost_the_lens() {
             .arg(&night),
     );
     assert_eq!(ran.status, 1);
-    for told in ["rms.cal: no frame has a site", "not/there.svg"] {
+    for told in ["rms.cal: no frame has both a site", "not/there.svg"] {
         assert!(ran.stderr.contains(told), "{}", ran.stderr);
     }
     assert!(path.exists() && other.exists());

@@ -200,14 +200,14 @@ fn an_extended_run_equals_the_longer_run() {
 fn a_directory_of_another_run_is_refused() {
     let (directory, out) = forty_frames();
     for (more, expected) in [
-        (&["--seed", "2"][..], "seed is 1 there and 2 here"),
+        (&["--seed", "2"][..], "seed is 1 there, but 2 here"),
         (
             &["--exposure", "0.3"],
-            "exposure_s is 0.1 there and 0.3 here",
+            "exposure_s is 0.1 there, but 0.3 here",
         ),
         (
             &["--scale-unknown"],
-            "scale_known is true there and false here",
+            "scale_known is true there, but false here",
         ),
     ] {
         let ran = validate(&out, &[&["--count", "40"], more].concat());
