@@ -1,6 +1,7 @@
 //! Which constellations does a frame show, and how much of each?
 
-use super::{Annotation, AnnotationKind, View};
+use super::annotation::{Annotation, AnnotationKind};
+use super::view::View;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::catalog::StarIndex;
 use crate::catalog::boundaries::constellation_at;

@@ -1,53 +1,12 @@
 //! Is the light at a star's place the star's, and was it measured?
 
-use super::View;
+use super::annotation::Unmeasured;
+use super::view::View;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median_of;
 use crate::identify::SourceIndex;
 use crate::photometry::instrumental_mag;
 use crate::solve::Source;
-
-/// Why the light of a star in a frame is not its measurement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Unmeasured {
-    /// Its spot is saturated.
-    Saturated,
-    /// Its light is that of several stars.
-    Blended,
-    /// Its spot is wider than a star's: a trail, a glow, or a disc.
-    Extended,
-    /// It is at the border of the frame.
-    Border,
-    /// Its place and brightness do not make its name as sure as other names are.
-    Uncertain,
-}
-
-impl Unmeasured {
-    /// Its name in JSON.
-    pub const fn code(self) -> &'static str {
-        match self {
-            Self::Saturated => "saturated",
-            Self::Blended => "blended",
-            Self::Extended => "extended",
-            Self::Border => "border",
-            Self::Uncertain => "uncertain",
-        }
-    }
-
-    /// What a detection without a name says of the star whose light it is.
-    fn of(source: &Source) -> Self {
-        let Some(flags) = source.measured.map(|measured| measured.flags) else {
-            return Self::Uncertain;
-        };
-        match flags {
-            _ if flags.saturated => Self::Saturated,
-            _ if !flags.is_star_like() => Self::Extended,
-            _ if flags.blended => Self::Blended,
-            _ if flags.border => Self::Border,
-            _ => Self::Uncertain,
-        }
-    }
-}
 
 /// The detections, and what each is known to be.
 pub(super) struct Lights<'a> {
@@ -98,7 +57,7 @@ impl<'a> Lights<'a> {
         let why = match self.named_v_mag[index] {
             Some(other) if other <= v_mag => return None,
             Some(_) => Unmeasured::Blended,
-            None => Unmeasured::of(&sources[index]),
+            None => why_unmeasured(&sources[index]),
         };
         let is_bright = self.is_bright_enough(&sources[index], v_mag, why);
         is_bright.then_some((SourceIndex::new(index), why))
@@ -118,4 +77,18 @@ impl<'a> Lights<'a> {
 /// The instrumental magnitude of a detection.
 fn mag_of(source: &Source) -> Option<f64> {
     source.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
+}
+
+/// What a detection without a name says of the star whose light it is.
+fn why_unmeasured(source: &Source) -> Unmeasured {
+    let Some(flags) = source.measured.map(|measured| measured.flags) else {
+        return Unmeasured::Uncertain;
+    };
+    match flags {
+        _ if flags.saturated => Unmeasured::Saturated,
+        _ if !flags.is_star_like() => Unmeasured::Extended,
+        _ if flags.blended => Unmeasured::Blended,
+        _ if flags.border => Unmeasured::Border,
+        _ => Unmeasured::Uncertain,
+    }
 }

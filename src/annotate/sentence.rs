@@ -1,6 +1,8 @@
 //! What a frame shows, in one sentence.
 
-use super::{Annotation, AnnotationKind, View, VisibleConstellation};
+use super::annotation::{Annotation, AnnotationKind};
+use super::constellations::VisibleConstellation;
+use super::view::View;
 use crate::base::coords::{Icrs, PixelPoint, UnitVector};
 use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::ephemeris::solar_system::BodyKind;

@@ -1,7 +1,8 @@
 //! The stars of a frame that have a name for people.
 
-use super::named_light::{Lights, Unmeasured};
-use super::{Annotation, AnnotationKind, View};
+use super::annotation::{Annotation, AnnotationKind, Unmeasured};
+use super::named_light::Lights;
+use super::view::View;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::catalog::{Catalog, StarIndex};
 use crate::identify::SourceIndex;

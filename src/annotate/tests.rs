@@ -1,12 +1,14 @@
 //! Tests over a simulated frame of Orion.
 
+use super::annotation::Unmeasured;
 use super::*;
-use crate::base::coords::{Rotation, UnitVector};
+use crate::base::coords::{PixelPoint, Rotation, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use crate::camera::{CameraModel, focal_length_px};
+use crate::catalog::StarIndex;
 use crate::detect::DetectionFlags;
 use crate::ephemeris::places::StarPlaces;
-use crate::identify::StarMatch;
+use crate::identify::{Identification, SourceIndex, StarMatch};
 use crate::solve::{Measured, Outcome, Source, sample};
 use nalgebra::Matrix3;
 

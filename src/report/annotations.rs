@@ -1,53 +1,11 @@
 //! Reports what has a name in a frame.
 
 use super::digits::{FRACTION_DECIMALS, PIXEL_DECIMALS, SIGMA_DIGITS};
-use super::frame_report::FrameReport;
+use super::frame_report::{AnnotationReport, ConstellationReport, FrameReport};
 use crate::annotate::{Annotation, AnnotationKind, Scene, VisibleConstellation};
 use crate::base::format::{finite, significant, to_decimals};
 use crate::catalog::Catalog;
 use crate::identify::SourceIndex;
-use serde::Serialize;
-
-/// A constellation in a frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ConstellationReport {
-    /// Its Latin name.
-    pub name: &'static str,
-    /// The abbreviation of the International Astronomical Union.
-    pub abbreviation: &'static str,
-    /// The share of the frame's sky that lies within its boundary.
-    pub share: f64,
-    /// The share of the lines of its figure that is in the frame.
-    pub figure_share: f64,
-}
-
-/// Something in a frame that has a name.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AnnotationReport {
-    /// `star`, `constellation`, `deep_sky`, `body` (the Moon or a planet) or `radiant` (of a meteor shower).
-    pub kind: &'static str,
-    /// Its name, in full.
-    pub name: String,
-    /// Its name beside it in a picture.
-    pub label: String,
-    /// Column of its place: of its measurement where there is one, else where the pose has it.
-    pub x: f64,
-    /// Row of its place.
-    pub y: f64,
-    /// Its light is within so many pixels of that place; `None` for constellations.
-    pub uncertainty_px: Option<f64>,
-    /// Half of its longer side, in pixels, where it has a size.
-    pub radius_px: Option<f64>,
-    /// V magnitude, where it has one.
-    pub vmag: Option<f64>,
-    /// Catalogue number of a star, designation of a deep-sky object.
-    pub id: Option<String>,
-    /// Number of the detection in [`stars`](FrameReport::stars) that has its light.
-    pub detection: Option<usize>,
-    /// Why that detection is not its measurement: `saturated`, `blended`, `extended`, `border` or `uncertain`;
-    /// `None` where it is.
-    pub why: Option<&'static str>,
-}
 
 /// Adds what has a name to `report`.
 pub(super) fn add_to(report: &mut FrameReport, scene: Scene, catalog: &Catalog) {

@@ -38,12 +38,11 @@ mod track;
 mod trails;
 pub mod wcs;
 
-pub use annotations::{AnnotationReport, ConstellationReport};
 pub use frame_report::{
-    ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport, CalibrationReport,
-    CompletenessReport, DateReport, DistortionReport, MagnitudeReport, MatchReport, NoteReport,
-    ObservationReport, OpticsReport, PhotometryReport, PredictionReport, SiteReport, StarReport,
-    Status, TimingReport, TrailReport,
+    AnnotationReport, ApparentReport, AttitudeReport, AttitudeSigma, BackgroundReport, BodyReport,
+    CalibrationReport, CompletenessReport, ConstellationReport, DateReport, DistortionReport,
+    MagnitudeReport, MatchReport, NoteReport, ObservationReport, OpticsReport, PhotometryReport,
+    PredictionReport, SiteReport, StarReport, Status, TimingReport, TrailReport,
 };
 pub use frame_report::{FrameReport, SCHEMA};
 pub use lens::LensReport;
