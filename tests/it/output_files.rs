@@ -81,7 +81,7 @@ fn an_overlay_is_of_the_kind_and_width_that_are_wanted() {
     for text in [
         "width=\"1000\"",
         ">HD 37742 ",
-        ">M 42<",
+        ">Orion Nebula<",
         ">0°<",
         ">5h40m<",
         ">alt ",
@@ -207,7 +207,7 @@ fn pages_regions_and_copies_are_written_where_they_are_asked_for() {
         assert_eq!(ran.status, 0, "{}", ran.stderr);
     }
     let page = fs::read_to_string(directory.path().join("night.html")).unwrap();
-    assert!(page.contains("Identified: ") && page.contains("data:image/jpeg;base64,"));
+    assert!(page.contains("Orion, with M 42") && page.contains("data:image/jpeg;base64,"));
     assert!(page.contains("Betelgeuse"), "no name in the page");
     let regions = fs::read_to_string(directory.path().join("night.reg")).unwrap();
     assert!(regions.contains("text={Betelgeuse"), "{regions}");
