@@ -497,15 +497,19 @@ impl<'w> PointedField<'w, '_> {
         let start = search.with_more_stars(&found);
         let named = with_names(problem, &mut search, &start, most_chance);
         let (refined, log10) = named.ok_or(failure)?;
-        let pairs = &mut search.refiner().pairs;
+        let pairs = &search.refiner().pairs;
         let posed = Posed::new(
             problem,
             refined.hypothesis(),
             refined.excess_sigma_px,
             pairs,
         );
-        pairs.extend(posed.pairs(most_chance));
-        pairs.sort_unstable_by_key(|pair| pair.observed);
+        let conspicuous = posed.pairs(most_chance);
+        let pairs = &mut search.refiner().pairs;
+        if !conspicuous.is_empty() {
+            pairs.extend(conspicuous);
+            pairs.sort_unstable_by_key(|pair| pair.observed);
+        }
         Ok(answered(answer, &refined, log10, problem.field, pairs))
     }
 

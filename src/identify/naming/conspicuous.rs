@@ -14,7 +14,6 @@ use crate::catalog::sky_grid::GridStar;
 use crate::identify::field::ObservedStar;
 use crate::identify::hypothesis::{Hypothesis, Problem};
 use crate::identify::pairing::Pair;
-use std::collections::HashSet;
 use std::f64::consts::PI;
 
 /// The faintest star that is named so.
@@ -41,11 +40,10 @@ pub struct Posed<'a> {
     problem: Problem<'a>,
     hypothesis: Hypothesis,
     excess_sigma_px: f64,
-    /// The observed stars that have a name, and the catalogue stars that are one of them.
-    named: HashSet<usize>,
-    taken: HashSet<StarIndex>,
-    /// Saturated light without a name.
-    unnamed: Vec<PixelPoint>,
+    /// The stars that have a name.
+    named: &'a [Pair],
+    /// Saturated light without a name: its number among the observed stars, and its place.
+    unnamed: Vec<(usize, PixelPoint)>,
 }
 
 /// A catalogue star near a spot.
@@ -56,43 +54,45 @@ struct Candidate {
 }
 
 impl<'a> Posed<'a> {
-    /// After a fit that ended with `pairs`; `excess_sigma_px` is what the stated centroid errors lack.
+    /// After a fit that ended with the pairs `named`; `excess_sigma_px` is what the stated centroid errors lack.
     pub fn new(
         problem: Problem<'a>,
         hypothesis: Hypothesis,
         excess_sigma_px: f64,
-        pairs: &[Pair],
+        named: &'a [Pair],
     ) -> Self {
-        let named: HashSet<usize> = pairs.iter().map(|pair| pair.observed).collect();
         let stars = problem.field.stars.iter().enumerate();
-        let unnamed = stars.filter(|(index, star)| star.is_saturated && !named.contains(index));
+        let saturated = stars.filter(|(_, star)| star.is_saturated);
+        let has_name = |observed: usize| named.iter().any(|pair| pair.observed == observed);
+        let unnamed = saturated.filter(|(observed, _)| !has_name(*observed));
         Self {
             problem,
             hypothesis,
             excess_sigma_px,
-            unnamed: unnamed.map(|(_, star)| star.position).collect(),
-            taken: pairs.iter().map(|pair| pair.star).collect(),
             named,
+            unnamed: unnamed
+                .map(|(observed, star)| (observed, star.position))
+                .collect(),
         }
     }
 
     /// The pairs of saturated spots without a name that are at most by this probability chance.
     pub fn pairs(&self, most_chance: f64) -> Vec<Pair> {
-        let stars = self.problem.field.stars.iter().enumerate();
-        let spots = stars.filter(|(index, star)| star.is_saturated && !self.named.contains(index));
-        let pairs = spots.filter_map(|(index, spot)| self.pair(index, spot));
+        let spots = self.unnamed.iter();
+        let pairs = spots.filter_map(|(observed, _)| self.pair(*observed));
         pairs.filter(|pair| pair.p_chance <= most_chance).collect()
     }
 
     /// The star that a spot is, if it is at its place and has no rivals.
-    fn pair(&self, observed: usize, spot: &ObservedStar) -> Option<Pair> {
+    fn pair(&self, observed: usize) -> Option<Pair> {
+        let spot = &self.problem.field.stars[observed];
         let own_sigma_px = libm::hypot(spot.sigma_px, self.excess_sigma_px);
         let error_px = SIGMAS * libm::hypot(own_sigma_px, SPOT_SIGMA_PX);
         let near = self.near(spot, RIVALS * error_px)?;
         let brightest = near.first()?;
         let v_mag = f64::from(brightest.v_mag);
         let is_it = brightest.distance_px <= error_px
-            && !self.taken.contains(&brightest.star)
+            && !self.named.iter().any(|pair| pair.star == brightest.star)
             && v_mag < spot.mag + self.hypothesis.zero_point_mag + FAINTER_MAG;
         let mut others = near.iter().skip(1);
         let has_rival = others.any(|other| f64::from(other.v_mag) < v_mag + RIVAL_MAG);
@@ -100,7 +100,7 @@ impl<'a> Posed<'a> {
         let is_alone = self
             .unnamed
             .iter()
-            .filter(|place| place.distance_to(&spot.position) < reach_px)
+            .filter(|(_, place)| place.distance_to(&spot.position) < reach_px)
             .count()
             == 1;
         if !is_it || has_rival || !is_alone {
@@ -159,7 +159,7 @@ impl<'a> Posed<'a> {
     fn p_chance(&self, spot: &ObservedStar, error_px: f64) -> f64 {
         let field = self.problem.field;
         let around_px = AROUND * libm::hypot(field.width_px, field.height_px);
-        let within = |place: &&PixelPoint| place.distance_to(&spot.position) < around_px;
+        let within = |near: &&(usize, PixelPoint)| near.1.distance_to(&spot.position) < around_px;
         let around = self.unnamed.iter().filter(within).count() as f64;
         // One of them is the spot itself; that none other was found does not mean that there can be none.
         let everywhere = self.unnamed.len() as f64 / (field.width_px * field.height_px);
