@@ -105,7 +105,7 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     let refused = process(night, "foreign", &[]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("stars.parquet and no archive.json"),
+        refused.stderr.contains("stars.parquet but no archive.json"),
         "{}",
         refused.stderr
     );
