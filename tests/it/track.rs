@@ -61,7 +61,7 @@ fn a_sequence_is_tracked_and_a_frame_without_light_is_lost() {
     let lost = &reports[5];
     assert_eq!(lost["not_tracked"]["code"], "no_agreement");
     assert!(lost["attitude"].is_null() && lost["reason"].is_string());
-    assert_eq!(lost["reason_code"], "too_few_stars");
+    assert_eq!(lost["reason_code"], "black");
     assert_eq!(lost["stars_used"], 0);
     let last = &reports[8];
     for (axis, rate) in [("x", 0.4), ("y", -0.9), ("z", 0.6)] {

@@ -220,7 +220,7 @@ fn a_directory_of_another_run_is_refused() {
     let ran = validate(&foreign, &["--count", "1"]);
     assert_eq!(ran.status, 2, "{}", ran.stderr);
     assert!(
-        ran.stderr.contains("has frames.csv and no run.json"),
+        ran.stderr.contains("has frames.csv but no run.json"),
         "{}",
         ran.stderr
     );
