@@ -69,8 +69,14 @@ impl Solved {
             });
             let options = OverlayOptions::default();
             let catalog = self.indexed.catalog();
-            page::html(&self.report(), &self.solution, catalog, shown.as_ref(), &options)
-                .map_err(exception)
+            page::html(
+                &self.report(),
+                &self.solution,
+                catalog,
+                shown.as_ref(),
+                &options,
+            )
+            .map_err(exception)
         })
     }
 

@@ -184,8 +184,15 @@ impl Solved {
     /// None that occur.
     pub fn html(&self) -> Result<String, JsError> {
         let options = OverlayOptions::default();
-        let draw =
-            |shown: &Shown<'_>| page::html(&self.report, &self.solution, self.catalog, Some(shown), &options);
+        let draw = |shown: &Shown<'_>| {
+            page::html(
+                &self.report,
+                &self.solution,
+                self.catalog,
+                Some(shown),
+                &options,
+            )
+        };
         self.shown(draw).map_err(told)
     }
 
@@ -195,7 +202,9 @@ impl Solved {
     /// None that occur.
     pub fn view(&self) -> Result<Vec<String>, JsError> {
         let options = OverlayOptions::default();
-        let draw = |shown: &Shown<'_>| page::view(&self.report, &self.solution, self.catalog, shown, &options);
+        let draw = |shown: &Shown<'_>| {
+            page::view(&self.report, &self.solution, self.catalog, shown, &options)
+        };
         let view = self.shown(draw).map_err(told)?;
         Ok(vec![view.html, view.data])
     }
