@@ -172,6 +172,31 @@ fn date() -> DateReport {
     }
 }
 
+fn constellation() -> ConstellationReport {
+    ConstellationReport {
+        name: "Orion",
+        abbreviation: "Ori",
+        share: 0.875,
+        figure_share: 0.75,
+    }
+}
+
+fn annotation() -> AnnotationReport {
+    AnnotationReport {
+        kind: "star",
+        name: "Betelgeuse (58 alp Ori)".into(),
+        label: "Betelgeuse".into(),
+        x: 123.456,
+        y: 56.78,
+        uncertainty_px: Some(1.25),
+        radius_px: None,
+        vmag: Some(0.45),
+        id: Some("SKYMAP 05550020".into()),
+        detection: Some(0),
+        why: Some("saturated"),
+    }
+}
+
 fn identified() -> FrameReport {
     FrameReport {
         date: Some(date()),
@@ -200,25 +225,8 @@ fn identified() -> FrameReport {
         }],
         status: Status::Identified,
         sentence: Some("Orion, with M 42, the Orion Nebula; 20 by 15 degrees, north is up".into()),
-        constellations: vec![ConstellationReport {
-            name: "Orion",
-            abbreviation: "Ori",
-            share: 0.875,
-            figure_share: 0.75,
-        }],
-        annotations: vec![AnnotationReport {
-            kind: "star",
-            name: "Betelgeuse (58 alp Ori)".into(),
-            label: "Betelgeuse".into(),
-            x: 123.456,
-            y: 56.78,
-            uncertainty_px: Some(1.25),
-            radius_px: None,
-            vmag: Some(0.45),
-            id: Some("SKYMAP 05550020".into()),
-            detection: Some(0),
-            why: Some("saturated"),
-        }],
+        constellations: vec![constellation()],
+        annotations: vec![annotation()],
         reason: None,
         reason_code: None,
         best_log10_false_alarm: None,
