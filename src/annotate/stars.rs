@@ -4,7 +4,7 @@ use super::annotation::{Annotation, AnnotationKind, Unmeasured};
 use super::named_light::Lights;
 use super::view::View;
 use crate::base::coords::{Icrs, UnitVector};
-use crate::catalog::{Catalog, StarIndex};
+use crate::catalog::StarIndex;
 use crate::identify::SourceIndex;
 use std::collections::HashMap;
 
@@ -77,21 +77,12 @@ fn annotation(
             unmeasured: light.1,
         },
         name: name.unwrap_or_else(|| view.catalog.designation(star)),
-        label: label(view.catalog, star),
+        label: view.catalog.label(star),
         position,
         uncertainty_px,
         v_mag: Some(f64::from(known.v_mag)),
         radius_px: 0.0,
     })
-}
-
-/// What a star is called in a picture.
-fn label(catalog: &Catalog, star: StarIndex) -> String {
-    let numbers = catalog.numbers_of(star);
-    let hd = || numbers.hd.map(|number| format!("HD {number}"));
-    let hip = || numbers.hip.map(|number| format!("HIP {number}"));
-    let name = catalog.short_name(star).or_else(hd).or_else(hip);
-    name.unwrap_or_else(|| catalog.designation(star))
 }
 
 /// The directions that a frame may see.

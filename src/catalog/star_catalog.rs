@@ -149,6 +149,16 @@ impl Catalog {
         proper.or_else(|| self.name_of(star).map(bayer::short))
     }
 
+    /// What a star is called in a picture: its short name, else its HD number, its Hipparcos number, or its
+    /// designation.
+    pub(crate) fn label(&self, star: StarIndex) -> String {
+        let numbers = self.numbers_of(star);
+        let hd = || numbers.hd.map(|number| format!("HD {number}"));
+        let hip = || numbers.hip.map(|number| format!("HIP {number}"));
+        let name = self.short_name(star).or_else(hd).or_else(hip);
+        name.unwrap_or_else(|| self.designation(star))
+    }
+
     /// The catalogue's own designation of a star: `SKYMAP nnnnnnnn`, `TYC a-b-c`, `HIP n`,
     /// `GAIA n`, `ID n`, or a name.
     ///

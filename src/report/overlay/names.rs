@@ -31,8 +31,7 @@ impl StarLabel {
             LabelKind::Hip => hip(),
         };
         let has_name = wanted.is_some();
-        let called = wanted.or_else(name).or_else(hd).or_else(hip);
-        let called = called.unwrap_or_else(|| catalog.designation(star));
+        let called = wanted.unwrap_or_else(|| catalog.label(star));
         let v_mag = catalog.star(star).v_mag;
         let fame = if catalog.proper_name(star).is_some() {
             PROPER_MAG
