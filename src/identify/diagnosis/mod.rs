@@ -15,6 +15,7 @@
 //! It costs time only where a frame was not identified. The search without the priors takes
 //! longest: as long as any search with nothing known.
 
+mod above;
 mod cause;
 mod doubles;
 mod levels;

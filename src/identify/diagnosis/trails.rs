@@ -1,8 +1,9 @@
 //! Trails: stars elongated in one direction, because the camera or the sky moved.
 
+use super::above::above_background;
 use super::cause::Diagnosis;
 use crate::base::statistics::median_of;
-use crate::detect::{BackgroundMap, Detection, Detections};
+use crate::detect::{Detection, Detections};
 use crate::frame::Frame;
 use image::{GrayImage, Luma};
 use imageproc::rect::{Rect, Region};
@@ -30,8 +31,6 @@ const MAX_OF_ALL: f64 = 0.6;
 const ALIGNMENT: f64 = 0.9;
 /// A region is first sought this far around the source, in pixels.
 const FIRST_REACH: u32 = 32;
-/// Cell size of the background mesh, in pixels.
-const CELL_PX: usize = 64;
 
 /// A source's region as a bar with the same second moments.
 struct SourceStreak {
@@ -76,19 +75,6 @@ pub(super) fn diagnose(frame: &Frame, detections: &Detections) -> Option<Diagnos
         angle_rad: libm::atan2(sum[1], sum[0]) / 2.0,
         length_px: median_of(lengths_px)?,
     })
-}
-
-fn above_background(frame: &Frame) -> Vec<f32> {
-    let background = BackgroundMap::measure(frame, CELL_PX);
-    let mut above = frame.values().into_owned();
-    let mut levels = vec![0.0; frame.width];
-    for (y, row) in above.chunks_mut(frame.width).enumerate() {
-        background.row(y, &mut levels);
-        row.iter_mut()
-            .zip(&levels)
-            .for_each(|(pixel, level)| *pixel -= level);
-    }
-    above
 }
 
 /// The regions of the brightest sources, as pixel indices; a region with several sources counts

@@ -2,14 +2,12 @@
 
 use super::shapes::{Shape, shapes};
 use crate::base::statistics::median;
-use crate::detect::BackgroundMap;
 use crate::frame::Frame;
+use crate::identify::diagnosis::above::above_background;
 use std::cell::OnceCell;
 
 /// Most pixels that are looked at. Stars, letters and strokes of larger frames are larger, too.
 const MAX_PX: usize = 3_000_000;
-/// Side of the background's cells, in pixels.
-const CELL_PX: usize = 64;
 /// Levels and noise are those of at most so many pixels.
 const SAMPLED_PX: usize = 1 << 18;
 /// Standard deviation of normal noise over the median step between neighbors.
@@ -121,20 +119,6 @@ fn noise(frame: &Frame) -> f32 {
     let steps =
         places.map(|index| (frame.pixels.value(index + 1) - frame.pixels.value(index)).abs());
     SIGMA_PER_STEP * median(&mut steps.filter(|step| step.is_finite()).collect::<Vec<_>>())
-}
-
-/// The frame without its background.
-fn above_background(frame: &Frame) -> Vec<f32> {
-    let background = BackgroundMap::measure(frame, CELL_PX);
-    let mut above = frame.values().into_owned();
-    let mut levels = vec![0.0; frame.width];
-    for (y, row) in above.chunks_mut(frame.width).enumerate() {
-        background.row(y, &mut levels);
-        row.iter_mut()
-            .zip(&levels)
-            .for_each(|(pixel, level)| *pixel -= level);
-    }
-    above
 }
 
 /// See [`Light::flat_share`].
