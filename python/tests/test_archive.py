@@ -117,7 +117,7 @@ def test_an_output_of_another_run_is_refused(night, alone, tmp_path):
     with pytest.raises(ValueError, match="there are no frames"):
         sp.dask.process(str(tmp_path / "*.tif"), str(tmp_path / "out"))
     (tmp_path / "stars.parquet").mkdir()
-    with pytest.raises(ValueError, match=r"and no archive\.json"):
+    with pytest.raises(ValueError, match=r"but no archive\.json"):
         sp.dask.process([str(night / "broken.tif")], str(tmp_path))
     with pytest.raises(OSError):
         sp.dask.process([str(night / "broken.tif")], str(night / "broken.tif" / "out"))
