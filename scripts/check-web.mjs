@@ -110,7 +110,7 @@ const shot = async (page, name) => { if (shots) await page.screenshot({ path: pa
 const state = (page) => page.locator("#state").textContent();
 const settled = (page) => page.waitForFunction(() => !document.querySelector("#work[aria-busy]") && !document.querySelector(".queue button[aria-label$='waits']"), null, { timeout: SOLVE_MS });
 const ready = async (page) => {
-  await page.waitForFunction(() => !document.querySelector("#state").textContent.includes("prepared"), null, { timeout: SOLVE_MS });
+  await page.waitForFunction(() => !document.querySelector("#state").textContent.includes("Loading"), null, { timeout: SOLVE_MS });
   check((await state(page)).startsWith("Ready"), await state(page));
 };
 /** Gives files as a visitor does: what moves at once is no shift of the layout. */
@@ -198,7 +198,7 @@ async function useWithoutRoom() {
   check(await isIdentified(page), "no answer without room");
   await page.waitForFunction(() => document.querySelector("#offline").textContent, null, { timeout: SOLVE_MS });
   const told = await page.locator("#offline").textContent();
-  check(told.includes("does not keep"), `without room: ${told}`);
+  check(told.includes("does not store"), `without room: ${told}`);
   await page.context().close();
 }
 
@@ -213,14 +213,14 @@ async function useUntrusted() {
   };
   await give(page, frames[0]);
   // While the index is built, which takes seconds. A cancel does not end that.
-  const bright = await until(["#state", "bright stars"]);
+  const bright = await until(["#state", "brightest stars"]);
   await shot(page, "progress-phone-dark");
   await page.locator("#cancel").click();
   await settled(page);
   check((await state(page)).includes("canceled"), `canceled while the index is built: ${await state(page)}`);
   await page.locator("#hints summary").click();
   await page.locator("#again").click();
-  console.log(`${path.basename(frames[0])} at the first visit: the bright stars answer after ${bright}, the whole catalog after ${await until(["#state", "is solved"])}`);
+  console.log(`${path.basename(frames[0])} at the first visit: the bright stars answer after ${bright}, the whole catalog after ${await until(["#state", "was solved"])}`);
   await page.context().close();
 }
 
@@ -232,7 +232,7 @@ async function useSlowly() {
   await give(page, frames[0]);
   await page.waitForFunction(() => /^[1-9]\.\d of \d\.\d MB$/.test(document.querySelector("#amount").textContent), null, { timeout: SOLVE_MS });
   await screenOf(page, "phone-slow");
-  await page.waitForFunction(() => document.querySelector("#state").textContent.includes("bright stars"), null, { timeout: SOLVE_MS });
+  await page.waitForFunction(() => document.querySelector("#state").textContent.includes("brightest stars"), null, { timeout: SOLVE_MS });
   console.log(`at 200 kB/s the first answer comes after ${seconds(Date.now() - start)}`);
   sentPerSecond = Infinity;
   await page.context().close();
@@ -336,7 +336,7 @@ async function useFrame(page) {
   await page.locator("section.table tbody tr").first().click();
   check((await page.locator("#under").textContent()).includes("SNR"), "a row tells nothing");
   await shot(page, "layers");
-  for (const [name, begins] of [["Save the picture", "\x89PNG"], ["Page (HTML)", "<!doctype"], ["Stars (CSV)", "frame,"], ["Coordinates", "SIMPLE"]]) {
+  for (const [name, begins] of [["Save the annotated picture", "\x89PNG"], ["Page (HTML)", "<!doctype"], ["Stars (CSV)", "frame,"], ["Coordinates", "SIMPLE"]]) {
     const bytes = await download(page, name);
     check(bytes.subarray(0, begins.length).toString("latin1") === begins, `${name} begins with ${bytes.subarray(0, 12).toString("latin1")}`);
   }

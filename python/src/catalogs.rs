@@ -30,7 +30,7 @@ pub fn open(key: Key, interrupt: &Interrupt) -> PyResult<&'static IndexedCatalog
                 if let Some(reasons) = file.summary.left_out() {
                     let (path, records) = (file.path.display(), file.summary.records);
                     warn(&format!(
-                        "{path}: not all of its {records} records are stars: {reasons}"
+                        "{path}: some of its {records} records are skipped: {reasons}"
                     ));
                 }
             }

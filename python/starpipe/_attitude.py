@@ -1,4 +1,4 @@
-"""Where a camera pointed."""
+"""Attitude of a camera."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Attitude:
 
     @property
     def rotation(self) -> Rotation | None:
-        """The same as a ``scipy.spatial.transform.Rotation``."""
+        """`quaternion` as a ``scipy.spatial.transform.Rotation``."""
         from scipy.spatial.transform import Rotation
 
         quaternion = self.quaternion
@@ -39,7 +39,7 @@ class Attitude:
 
     @property
     def center(self) -> SkyCoord | None:
-        """Direction of the frame's center; for lenses other than pinholes, of the lens's axis."""
+        """Direction of the frame's center, or of the lens axis for lenses other than pinholes."""
         from astropy.coordinates import SkyCoord
 
         attitude = self._attitude
@@ -55,9 +55,9 @@ class Attitude:
 
     @property
     def roll(self) -> Quantity | None:
-        """Position angle at `center` of up, towards the first row, in degrees.
+        """Position angle of the image's up direction, toward the first row, in degrees.
 
-        From north through east, in (-180, 180].
+        At `center`, from north through east, in (-180, 180].
         """
         attitude = self._attitude
         return None if attitude is None else quantity(attitude["up_pa_deg"], "deg")
@@ -76,7 +76,7 @@ class Attitude:
 
 
 def quantity(value: Any, unit: str) -> Quantity:
-    """Return `value` in `unit`; NaN where there is none."""
+    """Return `value` as a Quantity in `unit`; None becomes NaN."""
     from astropy.units import Quantity
 
     return Quantity(np.array(value, dtype=np.float64), unit)

@@ -1,4 +1,4 @@
-"""Cameras, conditions and scenes as the compiled part takes them."""
+"""Arguments of the extension module for cameras, conditions and scenes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ._hints import number, positive
 PathLike = str | os.PathLike[str]
 
 UNITS = ("mm", "um", "nm", "s", "deg")
-"""Units at the end of a parameter's name, in which it takes a Quantity."""
+"""Units at the end of a parameter's name, to which a Quantity is converted."""
 
 
 def stated(
     camera: PathLike, exposure: Any, reading: str | None, parameters: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return a camera, its conditions and a scene."""
+    """Return a camera, its conditions and a scene as the extension module expects them."""
     readings = {None: None, "paper": True, "physical": False}
     if reading not in readings:
         raise ValueError(f"reading must be 'paper' or 'physical', not {reading!r}")

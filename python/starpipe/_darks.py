@@ -1,4 +1,4 @@
-"""Frames taken without light."""
+"""Dark frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Darks:
     Attributes
     ----------
     report : dict
-        As the JSON of ``starpipe darks``: noise, pattern, dark current, warnings.
+        The JSON of ``starpipe darks``: noise, fixed pattern, dark current, warnings.
     """
 
     def __init__(self, darks: _starpipe.Darks) -> None:
@@ -38,7 +38,7 @@ class Darks:
 
     @property
     def masters(self) -> dict[float | None, NDArray[np.float32]]:
-        """Mean of each pixel, by the exposure in seconds: a dark for `Pipeline.solve`."""
+        """Master dark for each exposure in seconds, for the `dark` of `Pipeline.solve`."""
         shape = self._darks.shape
         return {exposure: means.reshape(shape) for exposure, means in self._darks.masters()}
 
@@ -55,7 +55,7 @@ class Darks:
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """True at the hot pixels: a mask for `Pipeline.solve`."""
+        """Mask for `Pipeline.solve`: True at the hot pixels."""
         mask = np.zeros(self._darks.shape, dtype=np.bool_)
         for pixel in json.loads(self._darks.hot_pixels()):
             mask[pixel["y"], pixel["x"]] = True
@@ -69,7 +69,7 @@ def darks(
     bits: int | None = None,
     gain: Quantity | float | None = None,
 ) -> Darks:
-    """Measure noise, pattern, dark current and hot pixels on frames taken without light.
+    """Measure read noise, fixed-pattern noise, dark current and hot pixels on dark frames.
 
     Frames are read one after the other, and not kept in memory.
 
@@ -78,11 +78,11 @@ def darks(
     images : iterable
         Frames as `Pipeline.solve` takes them.
     exposure : Quantity or float, or a list of them, optional
-        Exposure of all frames, or of each, in seconds; by default of the header.
+        Exposure of all frames, or of each, in seconds; by default from the header.
     bits : int, optional
-        Bits of a gray level; by default of the file's format.
+        Bit depth; by default that of the file's format.
     gain : Quantity or float, optional
-        Electrons of a gray level.
+        Gain, in electrons per ADU.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Detection alone."""
+"""Detection of stars without identification."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Detections:
     Attributes
     ----------
     background, noise : float
-        Median of the background, and of its standard deviation.
+        Medians of the background level and of its standard deviation.
     spot_sigma_px : float
         Standard deviation of a star's spot.
     threshold_sigma : float
@@ -62,17 +62,17 @@ class Detections:
 
     @property
     def stars(self) -> QTable:
-        """The stars as a ``QTable``; without astropy `columns`."""
+        """The stars as a ``QTable``, or `columns` without astropy."""
         return _tables.star_table(self.columns)
 
     @property
     def x(self) -> NDArray[np.float64]:
-        """Centroids along the rows, in pixels."""
+        """x (column) coordinates of the centroids, in pixels."""
         return self.columns["x"]
 
     @property
     def y(self) -> NDArray[np.float64]:
-        """Centroids along the columns, in pixels."""
+        """y (row) coordinates of the centroids, in pixels."""
         return self.columns["y"]
 
     @property
@@ -108,7 +108,7 @@ def detect(
     OSError
         If a file cannot be read.
     ValueError
-        If there is no image in it, or an argument is out of range.
+        If the file has no image, or an argument is out of range.
     """
     taken = Image(image)
     report = _starpipe.detect(

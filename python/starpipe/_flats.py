@@ -1,4 +1,4 @@
-"""Evenly lit frames."""
+"""Flat fields."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Flats:
     Attributes
     ----------
     report : dict
-        As the JSON of ``starpipe flats``: gain, read noise, nonuniformity, what is missing.
+        The JSON of ``starpipe flats``: gain, read noise, nonuniformity, missing quantities.
     """
 
     def __init__(self, flats: _starpipe.Flats) -> None:
@@ -35,9 +35,9 @@ class Flats:
 
     @property
     def master(self) -> NDArray[np.float32]:
-        """Response of each pixel, with a mean of 1: a flat for `Pipeline.solve`.
+        """Master flat for `Pipeline.solve`: the response of each pixel, with a mean of 1.
 
-        NaN if unknown.
+        NaN where it is unknown.
         """
         return self._flats.master().reshape(self._flats.shape)
 
@@ -48,27 +48,28 @@ def flats(
     dark: ImageLike | None = None,
     camera: PathLike | None = None,
 ) -> Flats:
-    """Measure response, gain and read noise on evenly lit frames.
+    """Measure pixel response, gain and read noise on flat fields.
 
-    The first and second frame are a pair with the same light, and so on: the gain follows from the
-    noise of such pairs. Frames are read one after the other; none is kept.
+    Frames are taken in pairs (first and second, third and fourth, ...) with equal illumination
+    within a pair. The gain follows from the noise of the pairs. Frames are read one after the
+    other, and not kept in memory.
 
     Parameters
     ----------
     images : iterable
         Frames as `Pipeline.solve` takes them.
     dark : image, optional
-        Frame taken without light, or the mean of many, see `Darks.masters`.
+        Dark frame or master dark to subtract, see `Darks.masters`.
     camera : path or str, optional
-        A description of the camera (TOML), or the name of a preset: its bias if there is no dark,
-        and its read noise.
+        A description of the camera (TOML), or the name of a preset. Its bias is used if there
+        is no dark, and its read noise.
 
     Raises
     ------
     OSError
         If a file cannot be read.
     ValueError
-        If frames have different sizes, are overexposed or have no light.
+        If frames have different sizes, are overexposed or dark.
     """
     if dark is None and camera is None:
         logging.getLogger("starpipe").warning(

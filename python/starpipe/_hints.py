@@ -1,4 +1,4 @@
-"""What the user knows of a frame: plain numbers and astropy's objects."""
+"""Conversion of hints, as plain numbers or objects of astropy, to plain numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def number(value: Any, unit: str, name: str) -> float | None:
-    """Return `value` in `unit`: a plain number is in it already, a Quantity is converted."""
+    """Return `value` in `unit`: plain numbers are unchanged, a Quantity is converted."""
     if value is None:
         return None
     if hasattr(value, "to_value") and hasattr(value, "unit"):
@@ -30,7 +30,7 @@ def number(value: Any, unit: str, name: str) -> float | None:
 
 
 def positive(value: Any, unit: str, name: str, below: float = np.inf) -> float | None:
-    """Return `value` in `unit`, where it is positive and less than `below`."""
+    """Return `value` in `unit`; it must be positive and less than `below`."""
     found = number(value, unit, name)
     if found is not None and not 0.0 < found < below:
         limit = f" and less than {below:g}" if np.isfinite(below) else ""
@@ -40,7 +40,7 @@ def positive(value: Any, unit: str, name: str, below: float = np.inf) -> float |
 
 
 def within(value: Any, unit: str, name: str, least: float, most: float = np.inf) -> float | None:
-    """Return `value` in `unit`, where it is from `least` to `most`."""
+    """Return `value` in `unit`; it must be from `least` to `most`."""
     found = number(value, unit, name)
     if found is not None and not least <= found <= most:
         limits = f"at least {least:g}" if most == np.inf else f"from {least:g} to {most:g}"
@@ -49,19 +49,19 @@ def within(value: Any, unit: str, name: str, least: float, most: float = np.inf)
 
 
 def whole_number(value: Any, name: str, least: int) -> int:
-    """Return a whole number that is not less than `least`."""
+    """Return `value` as a whole number; it must be at least `least`."""
     try:
         found = int(value)
         is_one = found == value and found >= least
     except (TypeError, ValueError, OverflowError):
         is_one = False
     if not is_one:
-        raise ValueError(f"{name} must be a whole number from {least} on, not {value}")
+        raise ValueError(f"{name} must be a whole number of at least {least}, not {value}")
     return found
 
 
 def pixel_angle(scale: Any) -> float | None:
-    """Return the angle of a pixel in arcseconds: an angle, or an angle per pixel."""
+    """Return the pixel scale in arcseconds, from an angle or an angle per pixel."""
     unit = getattr(scale, "unit", None)
     if unit is not None and unit.is_equivalent("deg / pix"):
         scale = scale.to_value("arcsec / pix")
@@ -79,7 +79,7 @@ def seconds(time: Any, name: str) -> float | None:
 
 
 def thread_count(threads: Any) -> int:
-    """Return how many threads to start: more than 8 only where there are more processors."""
+    """Return how many threads to start: at most 8, or the number of processors if larger."""
     return min(whole_number(threads, "threads", 1), max(8, os.cpu_count() or 1))
 
 
@@ -140,7 +140,7 @@ def air_at_site(air: Any) -> tuple[float, float]:
 
 
 def utc_offset_text(offset: Any) -> str:
-    """Return what local times are ahead of UTC, as the command line takes it."""
+    """Return the offset of local time from UTC in the format of the command line."""
     return offset if isinstance(offset, str) else str(number(offset, "h", "utc_offset"))
 
 
@@ -158,7 +158,7 @@ def velocity_km_s(velocity: Any) -> tuple[float, float, float]:
 
 
 def header_date(header: Any) -> str | None:
-    """Return the date of a header; one that is none is not used, as when a file is read."""
+    """Return the date of a header; an invalid date is ignored, as in files."""
     text = str(header.get("DATE-OBS", "")).strip()
     try:
         return None if np.isnat(np.datetime64(text.removesuffix("Z"))) else text
@@ -167,7 +167,7 @@ def header_date(header: Any) -> str | None:
 
 
 def header_exposure(header: Any) -> float | None:
-    """Return the exposure of a header in seconds, where one can have that."""
+    """Return the exposure of a header in seconds, or None if it is missing or implausible."""
     value = header.get("EXPTIME", header.get("EXPOSURE"))
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return float(value) if is_number and 1e-6 <= value <= 1e6 else None

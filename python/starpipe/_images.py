@@ -1,4 +1,4 @@
-"""Images as the compiled part takes them."""
+"""Conversion of images for the extension module."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     )
 else:
     ImageLike = Any
-"""What an image may be passed as.
+"""Types that are accepted as an image.
 
 - A path, the bytes of a file, or a file that is open for reading in binary mode.
 - An array (rows, columns), or (rows, columns, 3 or 4) or (3 or 4, rows, columns) of colors; an
   image of PIL.
-- An HDU or ``HDUList`` of astropy, which are read as the file that they would be written to; an
+- An HDU or ``HDUList`` of astropy, which are read like the file that they would be written to; an
   object with ``data``, such as ``CCDData`` and ``NDData``.
 """
 
 COLORS = (3, 4)
-"""Numbers of color channels; a fourth is not used."""
+"""Accepted numbers of color channels; the fourth channel is ignored."""
 
 KINDS = (
     "a path, bytes, a file open for reading in binary mode, an array, an image of PIL, "
@@ -54,7 +54,7 @@ KINDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Input:
-    """A frame as the compiled part takes it, with what is to be done to it."""
+    """A frame for the extension module, with its mask, dark, flat and bias level."""
 
     image: _starpipe._Image
     name: PathLike | None = None
@@ -65,7 +65,7 @@ class Input:
 
     @property
     def is_of_files(self) -> bool:
-        """Whether all of it is in files, which can be read again."""
+        """Whether image, dark and flat are files, which can be read again."""
         parts = (self.image, self.dark, self.flat)
         are_files = all(part is None or isinstance(part, (str, os.PathLike)) for part in parts)
         return are_files and self.mask is None
@@ -127,7 +127,7 @@ class Image:
         flat: ImageLike | None,
         bias_adu: float,
     ) -> Input:
-        """Return the image with what is to be done to it; `name` stands for that of its file."""
+        """Return the image with its mask and calibration; `name` replaces that of its file."""
         return Input(
             self.pixels,
             self.file_name if name is None else str(name),
@@ -148,7 +148,7 @@ def _content(file: Any, name: str) -> bytes:
     content = file.read()
     if not isinstance(content, (bytes, bytearray, memoryview)):
         kind = type(content).__name__
-        raise TypeError(f"the file of the {name} gives {kind}: open it in binary mode ('rb')")
+        raise TypeError(f"the file of the {name} returns {kind}: open it in binary mode ('rb')")
     return bytes(content)
 
 
@@ -223,22 +223,22 @@ def _mask(mask: NDArray[Any], name: str) -> NDArray[np.bool_]:
 
 
 def mask_of(image: Image, given: Any, name: str = "image") -> NDArray[np.bool_] | None:
-    """Return the pixels to leave out: those of the image's own mask and of `given`."""
+    """Return the pixels to ignore: those of the image's own mask and of `given`."""
     if given is None:
         return image.mask
     if np.ndim(given) == 0:
         raise TypeError(
-            f"mask must be an array of bool, not {given!r}; what is known of the {name} is "
-            "given by keyword, as fov=20"
+            f"mask must be an array of bool, not {given!r}; pass hints for the {name} by "
+            "keyword, such as fov=20"
         )
     mask = _mask(np.asarray(given), name)
     if image.mask is not None:
         if image.mask.shape != mask.shape:
-            raise ValueError(f"the mask is {mask.shape}, that of the {name} {image.mask.shape}")
+            raise ValueError(f"mask has shape {mask.shape}, that of the {name} {image.mask.shape}")
         mask = mask | image.mask
     shape = image.shape or mask.shape
     if shape != mask.shape:
-        raise ValueError(f"the mask is {mask.shape}, the {name} {shape}")
+        raise ValueError(f"mask has shape {mask.shape}, the {name} {shape}")
     return mask
 
 
@@ -269,7 +269,7 @@ def _pixels(image: Any, name: str) -> _starpipe._Image:
     array = _layout(array)
     is_color = array.ndim == 3
     if array.ndim != 2 and not (is_color and array.shape[2] in COLORS):
-        hint = "; pass one of its planes, as image[0]" if is_color else ""
+        hint = "; pass one of its planes, such as image[0]" if is_color else ""
         raise ValueError(
             f"the {name} must be an array (rows, columns), or (rows, columns, 3) of colors, "
             f"not {np.shape(image)}{hint}"

@@ -1,4 +1,4 @@
-"""The lens of a camera, from several of its frames."""
+"""Lens of a camera, measured in several of its frames."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class LensCalibration:
     Attributes
     ----------
     report : dict
-        As the JSON of ``starpipe calibrate``: ``lens``, ``frames``, ``left_out``, ``rms_px``,
+        The JSON of ``starpipe calibrate``: ``lens``, ``frames``, ``left_out``, ``rms_px``,
         ``held_out_rms_px``, ``drift``, ``mount``, ...
     toml : str
-        The lens as a description of a camera: ``Pipeline(camera=path)`` with a file of it uses
-        the lens.
+        The lens as a camera description. To use it, write it to a file (see `save`), and pass
+        the path to ``Pipeline(camera=path)``.
     """
 
     def __init__(self, report: dict[str, Any], toml: str) -> None:
@@ -45,13 +45,13 @@ class LensCalibration:
 def calibrate(results: Iterable[Result]) -> LensCalibration:
     """Measure the lens of a camera in frames that a pipeline has solved.
 
-    Frames that are not identified, or do not fit the others, are not used, see
+    Frames that are not identified, or do not agree with the others, are not used and listed in
     ``LensCalibration.report["left_out"]``.
 
     Parameters
     ----------
     results : iterable of Result
-        As `Pipeline.solve` and `Pipeline.solve_many` return them; not restored by pickle.
+        Results of `Pipeline.solve` or `Pipeline.solve_many`, but not unpickled ones.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def calibrate(results: Iterable[Result]) -> LensCalibration:
     for result in results:
         found: _starpipe.Solved | None = result.__dict__.get("_solved")
         if found is None:
-            raise ValueError("a result that was restored by pickle has no stars to calibrate with")
+            raise ValueError("an unpickled result has no stars to calibrate with")
         solved.append(found)
     report, toml = _starpipe.calibrate(solved)
     return LensCalibration(json.loads(report), toml)

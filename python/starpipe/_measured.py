@@ -1,4 +1,4 @@
-"""What was measured in a frame. The fields are those of the program's JSON, with their units."""
+"""Quantities measured in a frame. Fields and units are those of the program's JSON."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Match:
     Attributes
     ----------
     detected, matched : int
-        Detections, and those identified with a star.
+        Number of detections, and of those identified with a catalog star.
     stars_expected : float or None
         Expected number of catalog stars detected in the field, if a camera is given.
     rms_px, rms_arcsec : float
@@ -67,13 +67,13 @@ class Limit:
     limit50_vmag, limit50_sigma_mag : float or None
         Magnitude at which half of the catalog's stars are detected, and its standard error.
     limit50_reason : str or None
-        Why it is unknown.
+        Why there is no limiting magnitude.
     faintest_vmag : float or None
-        The faintest identified star.
+        V magnitude of the faintest identified star.
     predicted_limit_vmag : float or None
         Predicted magnitude at which the camera detects half of the stars.
     limit_difference_mag, limit_difference_sigma_mag : float or None
-        Detected minus predicted limit, and the standard error of the measurement.
+        Measured minus predicted limit, and the standard error of the measured one.
     expected_faintest_vmag, expected_faintest_sigma_mag : float or None
         Predicted faintest star detected by the camera in this field, and its scatter.
     """

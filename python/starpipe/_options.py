@@ -33,49 +33,48 @@ if TYPE_CHECKING:
 
 
 class SolveOptions(TypedDict, total=False):
-    """Options for solving frames. All of it is optional.
+    """Options for solving frames. All options may be omitted.
 
     Parameters
     ----------
     fov, pixel_scale : Quantity or float
-        Horizontal field of view (degrees), or the angle of a pixel (arcseconds, or arcseconds per
-        pixel).
+        Horizontal field of view (degrees), or pixel scale (arcseconds, or arcseconds per pixel).
     scale_error : Quantity or float
         Tolerance of `fov` or `pixel_scale`, in percent; 10 by default.
     near : SkyCoord or (ra, dec)
         Approximate direction of the frame's center, in degrees.
     radius : Angle or float
-        Maximum distance from there, in degrees; 10 by default.
+        Maximum distance of the frame's center from `near`, in degrees; 10 by default.
     date : Time, datetime or str
-        When the frame was taken, in UTC. By default of the header or the file's name.
+        Date and time of the frame, in UTC; by default from the header or the file name.
     utc_offset : Quantity, float or "auto"
         Offset of local time from UTC in hours, positive if ahead, for times in file names and
-        in Exif that state none. "auto" measures it with the stars and `site`.
+        in Exif that state no offset. "auto" determines it from the stars and `site`.
     site : EarthLocation or (latitude, longitude[, height])
-        Where it was taken, in degrees and meters.
+        Site of the camera, in degrees and meters.
     air : (pressure, temperature)
-        The air at the site, in hPa and °C, for refraction; by default of the standard atmosphere.
+        The air at the site, in hPa and °C, for refraction; by default the standard atmosphere.
     velocity : CartesianRepresentation or (vx, vy, vz)
         Velocity of a spacecraft relative to the Earth's center in km/s, along the axes of ICRS.
     frame_of : {"icrs", "apparent"}
-        Directions that the attitude refers to: those of the catalog, or the apparent ones, with
-        aberration and refraction.
+        Star directions that the attitude refers to: those of the catalog, or the apparent ones,
+        with aberration and refraction.
     exposure : Quantity or float
-        Exposure in seconds. By default of the header.
+        Exposure in seconds; by default from the header.
     zenith_distance : Angle or float
-        Zenith distance of the frame's center in degrees, for the prediction of a camera.
+        Zenith distance of the frame's center in degrees, for the predicted limiting magnitude.
     extinction : Quantity or float
-        Extinction in magnitudes per airmass, for the same.
+        Extinction in magnitudes per airmass, for the predicted limiting magnitude.
     sigma : float
-        Threshold of detection in standard deviations, in place of `false_alarms`.
+        Detection threshold in standard deviations of the background, instead of `false_alarms`.
     false_alarms : float
-        Accepted false detections in a million pixels of noise; 0.1 by default.
+        Accepted rate of false detections per million pixels of noise; 0.1 by default.
     max_stars : int
         Measure only this many of the brightest stars.
     centroid : {"gaussian-fit", "grey-weighted"}
-        How to measure the position of a star: the first is the most accurate, and the default.
+        How to measure the position of a star; "gaussian-fit" (default) is the most accurate.
     name_odds : float
-        Minimum odds, to 1, that the name of a star is right; 100 by default.
+        Minimum odds, `name_odds` to 1, that the name of a star is right; 100 by default.
     effort : {"fast", "normal", "thorough"}
         Effort of the search if the brightest stars do not identify a frame.
     refine_lens : bool
@@ -130,7 +129,7 @@ _UNITS = {
     "name_odds": "",
     "time_limit": "s",
 }
-"""The units of numbers."""
+"""Units of numeric options."""
 
 _VALUES: dict[str, Callable[[Any], Any]] = {
     "pixel_scale": pixel_angle,
@@ -145,7 +144,7 @@ _VALUES: dict[str, Callable[[Any], Any]] = {
     "sky": bool,
     "trails": bool,
 }
-"""What makes plain values of others, and of astropy's."""
+"""Functions that convert the values of the other options to plain values."""
 
 
 def _text(name: str, value: Any) -> str:
@@ -158,7 +157,7 @@ def _text(name: str, value: Any) -> str:
 
 
 def solve_options(header: Any = None, **options: Any) -> dict[str, str]:
-    """Return what the compiled part takes; a header completes what is not known."""
+    """Return options for the extension module, completed from a header."""
     for name in options.keys() - SolveOptions.__annotations__.keys():
         raise TypeError(f"unexpected keyword argument {name!r}")
     header = {} if header is None else header
@@ -177,7 +176,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def takes_options(function: _Function) -> _Function:
-    """Give a function whose last parameter is ``**options`` the signature that it has with them."""
+    """Replace ``**options`` in a function's signature by the options of `SolveOptions`."""
     signature = inspect.signature(function)
     own = list(signature.parameters.values())[:-1]
     stated = [

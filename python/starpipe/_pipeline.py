@@ -36,7 +36,7 @@ class Pipeline:
         by ``starpipe catalog import``.
     camera : path or str, optional
         A description of the camera (TOML), or the name of a preset. It gives the scale if no
-        argument does, and a predicted limiting magnitude.
+        option does, and a predicted limiting magnitude.
     cache_dir : path, optional
         Directory for the index of the catalog. The user's cache directory by default.
 
@@ -45,7 +45,7 @@ class Pipeline:
     OSError
         If a file cannot be read.
     ValueError
-        If there is no catalog or no camera in it.
+        If a file has no catalog or no camera.
     """
 
     def __init__(
@@ -82,37 +82,37 @@ class Pipeline:
         Parameters
         ----------
         image : path, bytes, file, array, PIL image, HDU, HDUList, CCDData or NDData
-            The frame. An array is (rows, columns), of real numbers, or (rows, columns, 3) of
-            colors. Arrays of uint8, uint16 and float32 that are contiguous are not copied. Of an
-            HDUList the same image is used as of its file. Mask and header of an object are used.
+            The frame. An array has the shape (rows, columns), or (rows, columns, 3) for colors, and
+            real numbers. Contiguous arrays of uint8, uint16 and float32 are not copied. From an
+            HDUList the same image is used as from its file. An object's mask and header are used.
         mask : array of bool, optional
-            True where a pixel is to be ignored, in the order of the rows of `image`.
+            True for pixels to ignore; its rows are in the order of those of `image`.
         name : path, optional
-            Name of the frame, if it does not come as a path; a date in it is used.
+            Name of the frame, if `image` is not a path; a date in the name is used.
         dark, flat : image, optional
-            Master dark to subtract, and master flat to divide by. They apply to the picture as
-            displayed if frame and master are files, else row by row.
+            Master dark to subtract, and master flat to divide by. If frame and master are files,
+            they are matched as displayed, otherwise row by row.
         threads : int
-            Threads for this frame. More than 8 are started only where there are more processors.
+            Threads for this frame, at most 8, or the number of processors if larger.
         **options
             Options, see `SolveOptions`.
 
         Returns
         -------
         Result
-            False in a condition where the stars are not identified. It keeps the pixels that were
-            passed, for `Result.plot`; those of a file are read again.
+            Its truth value is False if the stars are not identified. It keeps an array that was
+            passed, for `Result.plot`; a file is read again.
 
         Raises
         ------
         OSError
             If a file cannot be read.
         ValueError
-            If there is no image in it, or an argument is out of range.
+            If the file has no image, or an argument is out of range.
         TypeError
             If an argument is of a wrong type.
         TimeoutError
-            If there is no answer within `time_limit`.
+            If the frame is not solved within `time_limit`.
         RuntimeError
             If starpipe has a bug.
         """
@@ -132,14 +132,14 @@ class Pipeline:
         image : path, bytes, file, array, PIL image, HDU, HDUList, CCDData or NDData
             The frame, as `solve` takes it.
         mask : array of bool, optional
-            True where a pixel is to be left out.
+            True for pixels to ignore.
         **known
-            What else `solve` takes.
+            Other arguments of `solve`.
 
         Returns
         -------
         Result
-            As of `solve` with `attitude_only`.
+            The same as `solve` returns with `attitude_only`.
 
         Raises
         ------
@@ -168,10 +168,10 @@ class Pipeline:
             Positions in pixels: (0, 0) is the center of the first pixel.
         shape : (int, int), optional
             Rows and columns of the frame; those of the pipeline's camera by default. Without a
-            camera the extent of the centroids is used; `notes` say so, and the errors include that
-            the frame's center is uncertain.
+            camera the extent of the centroids is used; `notes` say so, and the errors include the
+            uncertainty of the frame's center.
         flux, mag : array, optional
-            Brightness, linear or in magnitudes: one of them. Without it the positions must be
+            Brightness, either linear or in magnitudes. If neither is given, the positions must be
             sorted by brightness.
         error : array or float, optional
             Standard error on each axis, in pixels; 0.5 by default.
@@ -179,12 +179,12 @@ class Pipeline:
             Positions are ignored if a number is not finite, if a flux or an error is 0 or below, or
             if they coincide with a brighter one; `notes` report them.
         **options
-            Options, see `SolveOptions`; those for pixels are ignored.
+            Options, see `SolveOptions`; those that need pixels are ignored.
 
         Returns
         -------
         Result
-            False in a condition where the stars are not identified.
+            Its truth value is False if the stars are not identified.
 
         Raises
         ------
@@ -192,10 +192,10 @@ class Pipeline:
             If arrays do not match, an argument is out of range, the shape is not that of the
             pipeline's camera, or a position is more than 5 pixels outside the frame.
         TimeoutError
-            If there is no answer within `time_limit`.
+            If the frame is not solved within `time_limit`.
         """
         if flux is not None and mag is not None:
-            raise ValueError("give the brightness as flux or as mag")
+            raise ValueError("flux and mag are alternatives: give one")
         if error is not None and np.ndim(error) == 0 and not np.asarray(error) > 0.0:
             raise ValueError(f"error must be above 0, not {error}")
         brightness = "flux" if flux is not None else "mag" if mag is not None else None
@@ -224,17 +224,17 @@ class Pipeline:
     ) -> Iterator[Result]:
         """Solve many frames on several threads; results come in the order of the images.
 
-        Images are read as results are used: at most twice as many as threads are in progress.
+        Images are read as results are consumed; at most 2 × `threads` are in progress.
 
         Parameters
         ----------
         images : iterable
             Images as `solve` takes them, preferably paths.
         threads : int
-            Frames that are solved at once, each within the memory that a frame may take. More than
-            8 are started only where there are more processors.
+            Number of frames that are solved at once, at most 8, or the number of processors if
+            larger. The memory limit applies to each frame.
         **known
-            What else `solve` takes, for all frames.
+            Other arguments of `solve`, for all frames.
 
         Yields
         ------

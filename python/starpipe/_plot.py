@@ -1,4 +1,4 @@
-"""Results on a photograph, with matplotlib."""
+"""Plots of results on a photograph, with matplotlib."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ MARKS: dict[str, tuple[str, dict[str, Any]]] = {
     "not identified": ("s", {"facecolors": "none", "edgecolors": "#ffaa3c"}),
     "not a star": ("x", {"color": "#c878be"}),
 }
-"""Forms and colors of marks, as in the program's overlays."""
+"""Shapes and colors of marks, as in the program's overlays."""
 
 
 def printable(text: str) -> str:
-    """Return a text with the characters escaped that change how others are drawn."""
+    """Return a text with its unprintable characters escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Drawn(Protocol):
-    """What of a result is drawn."""
+    """The properties of a result that are drawn."""
 
     @property
     def _name(self) -> str: ...

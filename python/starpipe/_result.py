@@ -1,4 +1,4 @@
-"""What was found in a frame."""
+"""Results of solving frames."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Result(Attitude):
-    """What was found in a frame. As a condition it is true if the stars are identified.
+    """Result of solving a frame. Its truth value is True if the stars are identified.
 
     Pixels are those of the array, or of the array that ``astropy.io.fits.getdata`` reads from the
     file: (0, 0) is the center of the first pixel of its first row, x runs along a row, y counts
@@ -43,7 +43,7 @@ class Result(Attitude):
     Attributes
     ----------
     error : Exception or None
-        What was raised instead of an answer, in results of `Pipeline.solve_many`.
+        Exception of a frame that could not be solved, in results of `Pipeline.solve_many`.
     """
 
     error: Exception | None = None
@@ -206,7 +206,7 @@ class Result(Attitude):
 
     @property
     def remedies(self) -> list[str]:
-        """Names of the options that may help where the stars are not identified."""
+        """Names of options that may help if the stars are not identified."""
         return self._report["remedies"]  # type: ignore[no-any-return]
 
     @property
@@ -221,9 +221,9 @@ class Result(Attitude):
 
     @property
     def annotations(self) -> list[dict[str, Any]]:
-        """What has a name in the frame: the `annotations` of the JSON, pixels as in `stars`.
+        """Named objects in the frame: the `annotations` of the JSON, with pixels as in `stars`.
 
-        Bright stars are among them whether they were measured or not; ``why`` says why not.
+        Bright stars are listed even if they were not measured; ``why`` gives the reason.
         """
         height = self._report["height"]
         found = [dict(shown) for shown in self._report["annotations"]]
@@ -248,12 +248,12 @@ class Result(Attitude):
 
     @property
     def sky_map(self) -> dict[str, Any] | None:
-        """Brightness, extinction and clouds, with ``sky=True``: `sky` of the JSON."""
+        """Brightness, extinction and clouds (`sky` of the JSON); needs ``sky=True``."""
         return self._report.get("sky")
 
     @property
     def trails(self) -> list[dict[str, Any]] | None:
-        """Trails of satellites and the like, with ``trails=True``: `trails` of the JSON."""
+        """Trails of satellites and the like (`trails` of the JSON); needs ``trails=True``."""
         return self._report.get("trails")
 
     @property
@@ -287,7 +287,7 @@ class Result(Attitude):
     def pixel_scale(self) -> Quantity | None:
         """Pixel scale at the frame's center, in arcseconds per pixel.
 
-        On the axis, for lenses other than pinholes.
+        For lenses other than pinholes, it is that on the axis.
         """
         optics = self._report["optics"]
         if optics is None:
@@ -296,7 +296,7 @@ class Result(Attitude):
 
     @property
     def distortion(self) -> Distortion | None:
-        """Distortion of the lens; None also if it is not measurable."""
+        """Distortion of the lens; also None if it is not measurable."""
         optics = self._report["optics"]
         found = None if optics is None else optics["distortion"]
         if found is None:
@@ -315,7 +315,7 @@ class Result(Attitude):
 
     @property
     def limit(self) -> Limit | None:
-        """Detected and predicted limiting magnitude."""
+        """Measured and predicted limiting magnitude."""
         measured, compared = self._report["photometry"], self._report["magnitude"]
         if measured is None and compared is None:
             return None
@@ -329,7 +329,7 @@ class Result(Attitude):
         return None if cards is None else wcs_of(cards, self.shape)
 
     def to_header(self) -> Header | None:
-        """Return the same as a FITS header, to be added to that of the file or the array."""
+        """Return `wcs` as a FITS header, to be added to that of the file or the array."""
         if self._wcs_header is None:
             return None
         header = _header(self._wcs_header)
@@ -346,12 +346,12 @@ class Result(Attitude):
 
     @property
     def star_columns(self) -> _tables.Columns:
-        """Every detection, brightest first, as arrays; NaN and "" where there is no value."""
+        """Every detection, brightest first, as arrays; missing values are NaN or ""."""
         return _tables.star_columns(self._report["stars"])
 
     @property
     def stars(self) -> QTable:
-        """Every detection, brightest first, as a ``QTable``; without astropy `star_columns`.
+        """Every detection, brightest first, as a ``QTable``, or `star_columns` without astropy.
 
         Cells have units. If plain numbers are needed, as in ``float(row["x"])``, use `plain_stars`.
         """
@@ -359,7 +359,7 @@ class Result(Attitude):
 
     @property
     def plain_stars(self) -> PlainTable:
-        """The same as `stars` as a ``Table``, whose cells are numbers; units are of its columns."""
+        """`stars` as a ``Table`` whose cells are plain numbers; its columns have the units."""
         return self._star_table(plain=True)
 
     def _star_table(self, *, plain: bool) -> Any:
@@ -371,7 +371,7 @@ class Result(Attitude):
 
     @property
     def sky(self) -> SkyCoord | None:
-        """Where `stars` are at the frame's date."""
+        """ICRS positions of `stars` at the frame's date."""
         from astropy.coordinates import SkyCoord
 
         if not self:
@@ -395,25 +395,25 @@ class Result(Attitude):
     ) -> Axes:
         """Draw the photograph with its stars marked and named, with matplotlib.
 
-        The photograph is in its own colors where the frame has some, and brightened as in the
-        program's overlays. It is that which was solved: a file is read again. Coordinates are the
-        pixels of `stars`; the rows of a file that begins with the bottom row run upwards.
+        A color photograph is shown in color, and brightened as in the program's overlays. A frame
+        that was solved from a file is read again. Coordinates are the pixels of `stars`; the rows
+        of a file that begins with the bottom row run upward.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
             Where to draw; new axes by default.
         image : path, array or another image, optional
-            The photograph, where the result has none: of a list of centroids, of an array that
-            `Pipeline.solve_many` was given, or of an array and restored by pickle. Without it the
-            background is dark.
+            The photograph, if the result does not keep it: for a list of centroids, and for an
+            array if the result is from `Pipeline.solve_many` or was unpickled. Without a photograph
+            the background is dark.
         rings : {"named", "all", "none"}
-            Which detections are marked: those that get their name, and all in a frame that is not
-            identified; all; or none. A circle is identified, a square is not, a cross is not
-            shaped like a star.
+            Detections to mark: "named" for stars with a label (all detections if the frame is not
+            identified), all, or none. Circles mark identified stars, squares other detections, and
+            crosses detections that are not shaped like stars.
         names : int
-            How many stars get their name: the brightest with a name, and then the brightest others
-            with their number in a catalog.
+            How many stars to label: the brightest with a proper name, and then the brightest
+            others with their catalog number.
 
         Returns
         -------
@@ -422,9 +422,9 @@ class Result(Attitude):
         Raises
         ------
         ImportError
-            Without matplotlib.
+            If matplotlib is not installed.
         OSError
-            If the file cannot be read. What is in `error` is raised again.
+            If the file cannot be read. An exception in `error` is raised again.
         ValueError
             If `image` does not have the size of the frame.
         """
@@ -443,15 +443,15 @@ class Result(Attitude):
     ) -> None:
         """Write a page for a browser, as ``starpipe process --html`` does.
 
-        One HTML file without references to others: the answer, the picture with its stars, figures
-        and a table. Pixels are those of `stars`, and the first row is on top.
+        The page is a single HTML file with the result, the picture with its stars, figures and a
+        table. Pixels are those of `stars`, and the first row is on top.
 
         Parameters
         ----------
         path : path
             The file; its name ends with ``.html``.
         image : path, array or another image, optional
-            The picture, as for `plot`; without one the page has none.
+            The photograph, as for `plot`; without one the page has no picture.
         overwrite : bool
             Whether to replace a file that exists.
 
@@ -460,7 +460,7 @@ class Result(Attitude):
         OSError
             If the file exists, or cannot be written; if the frame cannot be read.
         ValueError
-            If `image` does not have the size of the frame, or the result was restored by pickle.
+            If `image` does not have the size of the frame, or the result was unpickled.
         """
         content = self._found.page(self._shown(image))
         _write(path, content.encode(), overwrite)
@@ -468,7 +468,7 @@ class Result(Attitude):
     def write_regions(self, path: PathLike, *, overwrite: bool = False) -> None:
         """Write the detections as regions for SAOImage DS9, as ``--regions`` does.
 
-        They are in the pixels of the file, as DS9 counts them.
+        Positions are in pixels of the file, as counted by DS9.
 
         Parameters
         ----------
@@ -482,7 +482,7 @@ class Result(Attitude):
         OSError
             If the file exists, or cannot be written.
         ValueError
-            If the result was restored by pickle.
+            If the result was unpickled.
         """
         _write(path, self._found.regions().encode(), overwrite)
 
@@ -491,16 +491,16 @@ class Result(Attitude):
     ) -> None:
         """Write a copy of the frame with `wcs` in its header, as ``--write-fits`` does.
 
-        The copy has the pixels that were solved: colors as luminance, calibrated by dark and flat.
-        Its rows are in the order of the array, so its pixels are those of `stars`. Add `to_header`
-        to the header of a file to keep that header.
+        The copy has the pixels that were solved: the luminance of a color frame, calibrated with
+        dark and flat. Its rows are in the order of the array, so its pixels are those of `stars`.
+        To keep the header of a file, add `to_header` to that header instead.
 
         Parameters
         ----------
         path : path
             The file; its name ends with ``.fits``.
         image : path, array or another image, optional
-            The frame, where the result has none, as for `plot`.
+            The frame, if the result does not keep it, as for `plot`.
         overwrite : bool
             Whether to replace a file that exists.
 
@@ -510,7 +510,7 @@ class Result(Attitude):
             If the file exists, or cannot be written; if the frame cannot be read.
         ValueError
             If the stars are not identified, there is no frame, `image` does not have its size, or
-            the result was restored by pickle.
+            the result was unpickled.
         """
         found, frame = self._found, self._shown(image)
         if frame is None:
@@ -527,7 +527,7 @@ class Result(Attitude):
             raise self.error
         solved: _starpipe.Solved | None = self.__dict__.get("_solved")
         if solved is None:
-            raise ValueError("a result that was restored by pickle cannot be written: solve again")
+            raise ValueError("an unpickled result cannot be written: solve the frame again")
         return solved
 
     def _shown(self, image: ImageLike | None) -> Input | None:
@@ -558,7 +558,7 @@ def _write(path: PathLike, content: bytes, overwrite: bool) -> None:
 
 
 def wcs_of(cards: bytes, shape: tuple[int, ...]) -> WCS:
-    """Return the world coordinates in the cards of a header, of an image of `shape`."""
+    """Return the WCS in the cards of a header, for an image of `shape`."""
     from astropy.wcs import WCS
 
     header = _header(cards)

@@ -28,11 +28,11 @@ class Simulation:
     Attributes
     ----------
     image : ndarray
-        Grey levels, of the smallest type that has the camera's bits.
+        Gray levels, in the smallest integer type that holds the camera's bit depth.
     quaternion : ndarray or None
         Rotation of ICRS vectors into camera axes: [w, x, y, z].
     limit_vmag : float or None
-        V magnitude at which half of the stars should be found.
+        Predicted limiting magnitude: V at which half of the stars are detected.
     exposure_s : float
         Exposure in seconds.
     """
@@ -57,7 +57,7 @@ class Simulation:
 
     @property
     def wcs(self) -> WCS | None:
-        """True world coordinates; distortion is not in them."""
+        """True world coordinates, without distortion."""
         shape = self.image.shape
         return None if self._wcs_header is None else wcs_of(self._wcs_header, shape)
 
@@ -68,7 +68,7 @@ class Simulation:
 
     @property
     def stars(self) -> QTable:
-        """True objects on the frame as a ``QTable``; without astropy `columns`."""
+        """True objects on the frame as a ``QTable``, or `columns` without astropy."""
         units = {"vmag": "mag", "bv_mag": "mag", "ra_deg": "deg", "dec_deg": "deg"}
         places = dict.fromkeys(("x", "y", "x_end", "y_end"), "pix")
         return _tables.table(self.columns, units | places | {"electrons": "electron"})
@@ -99,20 +99,20 @@ def simulate(
         Center of the frame and position angle of the image's up direction, in degrees. Without them
         the pointing is random, uniform over all rotations.
     dark : bool
-        Keep the shutter closed.
+        Simulate a dark frame: the shutter is closed.
     flat : float, optional
-        The same light on each pixel in place of the sky, in electrons.
+        Simulate a flat field: the same light on each pixel, in electrons.
     date : Time, datetime or str, optional
         Date for proper motion; 2000 by default.
     seed, frame : int
-        Seed of the random numbers, and number of the frame: ``starpipe simulate`` makes the same
-        frame of the same two.
+        Seed of the random numbers, and number of the frame. ``starpipe simulate`` with the same
+        two numbers simulates the same frame.
     exposure : Quantity or float, optional
         Exposure in seconds.
     catalog : path, optional
-        Stars instead of the built-in ones.
+        Star catalog instead of the built-in one.
     **parameters
-        Other numbers of camera, conditions and scene, by the names of the program's options, as
+        Other parameters of camera, conditions and scene, named like the program's options, such as
         ``read_noise_e`` or ``satellite_trails``.
 
     Raises
@@ -125,7 +125,7 @@ def simulate(
     subject: tuple[float, float, float] | float | str
     if dark or flat is not None:
         if ra is not None or dec is not None or (dark and flat is not None):
-            raise ValueError("a frame shows the sky at ra and dec, or it is dark, or a flat field")
+            raise ValueError("ra and dec, dark, and flat are alternatives: give one")
         light = within(flat, "electron", "flat", 0.0)
         subject = "dark" if light is None else light
     elif ra is None and dec is None:

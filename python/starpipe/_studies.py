@@ -34,15 +34,15 @@ def limit(
     exposure : Quantity or float, optional
         Exposure in seconds.
     reading : {'paper', 'physical'}, optional
-        The equations of the paper, or the same with physical errors corrected.
+        The equations as used by Tong, Li & Wang (2014), or with physical errors corrected.
     **parameters
-        Other numbers of camera and conditions, by the names of the program's options, as
+        Other parameters of camera and conditions, named like the program's options, such as
         ``aperture_mm`` or ``sky_mag_arcsec2``.
 
     Returns
     -------
     dict
-        As the JSON of ``starpipe limit``: ``limit_vmag``, ``snr``, ``detector``, ...
+        The JSON of ``starpipe limit``: ``limit_vmag``, ``snr``, ``detector``, ...
     """
     found: dict[str, Any] = json.loads(
         _starpipe.limit(stated(camera, exposure, reading, parameters))
@@ -56,7 +56,7 @@ class Validation:
     Attributes
     ----------
     summary : dict
-        As ``summary.json`` of ``starpipe validate``.
+        The ``summary.json`` of ``starpipe validate``.
     """
 
     def __init__(self, report: dict[str, Any]) -> None:
@@ -103,11 +103,11 @@ def validate(
     camera, exposure, catalog, **parameters
         As for `simulate`.
     count, seed : int
-        How many frames, and the seed of their random numbers.
+        Number of frames, and seed of the random numbers.
     scale_known : bool
-        Whether the pipeline is given the camera.
+        Whether the camera's description is given to the pipeline.
     threads : int
-        Threads; results do not depend on it.
+        Number of threads; results do not depend on it.
     """
     report = _starpipe.validate(
         stated(camera, exposure, None, parameters),
@@ -140,10 +140,10 @@ def robustness(
     Parameters
     ----------
     fov : Quantity or float, optional
-        Horizontal field of view in degrees: one row. Without it, the standard table: five fields,
-        then one worse condition at a time.
+        Horizontal field of view in degrees, for one row. Without it the standard table is computed:
+        five fields of view, then one condition at a time made worse.
     count, seed, threads : int
-        Trials of each row, seed of the random numbers, and threads.
+        Trials of each row, seed of the random numbers, and number of threads.
     stars : float
         Mean number of catalog stars on a frame.
     centroid_error, mag_error : float
@@ -151,16 +151,16 @@ def robustness(
     missing, false : float
         Stars that are missing, and false stars, in percent of the stars.
     scale_error : float or None
-        Largest error of the stated field of view, in percent; None states none.
+        Largest error of the field of view, in percent; if None, the field of view is not given.
     shape : (int, int)
         Rows and columns of the frame.
     catalog : path, optional
-        Stars in place of the built-in ones.
+        Star catalog instead of the built-in one.
 
     Returns
     -------
     list of dict
-        As the JSON of ``starpipe robustness``.
+        The rows in the JSON of ``starpipe validate --suite robustness``.
     """
     lists = {
         "fov_deg": positive(fov, "deg", "fov", 179.0),
@@ -201,22 +201,22 @@ def defocus(
     Parameters
     ----------
     camera : path or str, optional
-        A camera; without it the experiment of the paper.
+        A camera; without one, the experiment of Wang et al. (2019) is repeated.
     vmag : float or list
-        V magnitudes of the stars; 1.5 brighter than the camera's limit by default.
+        V magnitudes of the stars; by default 1.5 mag brighter than the camera's limit.
     required_error : float or list
-        Errors in pixels: the radii that meet them are reported.
+        Required errors in pixels; the radii that meet them are reported.
     darks : Darks, optional
         Dark frames from which the noise is taken.
     count, seed, threads : int
-        Stars at each point, seed of the random numbers, and threads.
+        Stars at each point of the grid, seed of the random numbers, and number of threads.
     exposure, **parameters
         As for `limit`.
 
     Returns
     -------
     dict
-        As the JSON of ``starpipe defocus``.
+        The JSON of ``starpipe defocus``.
     """
     if camera is None and (exposure is not None or parameters or np.size(vmag)):
         raise ValueError("vmag, exposure and other numbers need a camera: give one")

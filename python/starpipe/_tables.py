@@ -1,4 +1,4 @@
-"""Tables of stars, and of other rows."""
+"""Tables of stars and of other rows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STAR_COLUMNS = {
 
 
 def star_columns(stars: list[dict[str, Any]]) -> Columns:
-    """Return the reports of stars as arrays; NaN and "" where there is no value."""
+    """Return stars as arrays; missing values are NaN or ""."""
 
     def values(name: str, kind: str) -> NDArray[Any]:
         found = [star.get(name) for star in stars]
@@ -36,8 +36,8 @@ def star_columns(stars: list[dict[str, Any]]) -> Columns:
 def star_table(named: Columns, *, plain: bool = False) -> Any:
     """Return columns of stars as a ``QTable`` with units, UCDs and descriptions.
 
-    With `plain` as a ``Table``, whose cells are numbers. Without astropy they are returned as they
-    are.
+    With `plain`, return a ``Table`` whose cells are plain numbers. Without astropy, return `named`
+    unchanged.
     """
     found = table(named, {name: STAR_COLUMNS[name][1] for name in named}, plain=plain)
     if found is not named:
@@ -48,7 +48,7 @@ def star_table(named: Columns, *, plain: bool = False) -> Any:
 
 
 def columns(rows: list[dict[str, Any]]) -> Columns:
-    """Return rows of equal keys as arrays; NaN and "" where there is no value."""
+    """Return rows with the same keys as arrays; missing values are NaN or ""."""
     names: Iterable[str] = rows[0] if rows else ()
     return {name: _column([row[name] for row in rows]) for name in names}
 
@@ -62,7 +62,7 @@ def _column(values: list[Any]) -> NDArray[Any]:
 
 
 def table(named: Columns, units: dict[str, str], *, plain: bool = False) -> Any:
-    """Return columns as a ``QTable``, or a plain ``Table``; without astropy as they are."""
+    """Return columns as a ``QTable`` or plain ``Table``, or unchanged without astropy."""
     try:
         from astropy.table import QTable, Table
     except ImportError:

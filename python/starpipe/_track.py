@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Track(Attitude):
-    """Result of tracking for a frame. As a condition it is true if the attitude is known.
+    """Result of tracking for a frame. Its truth value is True if the attitude is known.
 
     Pixels are as in `Result`.
     """
@@ -72,7 +72,7 @@ class Track(Attitude):
     def rate(self) -> Quantity | None:
         """Angular rate of the camera about its x, y and z axes, in degrees per second.
 
-        In degrees per frame, if times are not given; None before the second attitude.
+        It is in degrees per frame if times are not given, and None before the second attitude.
         """
         return self._rate("")
 
@@ -90,7 +90,7 @@ class Track(Attitude):
 
     @property
     def stars_used(self) -> int:
-        """How many stars the attitude was fitted to."""
+        """Number of stars to which the attitude was fitted."""
         return self._report["stars_used"]  # type: ignore[no-any-return]
 
     def to_dict(self) -> dict[str, Any]:
@@ -113,9 +113,9 @@ class Tracker:
     stars : int
         Maximum number of stars to measure in a frame.
     dark, flat : image, optional
-        What to subtract from each frame, and by what to divide, as for `Pipeline.solve`.
+        Master dark to subtract, and master flat to divide by, as for `Pipeline.solve`.
     **options
-        What is stated of the frames, see `SolveOptions`.
+        Options for all frames, see `SolveOptions`.
 
     Raises
     ------
@@ -166,7 +166,7 @@ class Tracker:
         OSError
             If a file cannot be read.
         ValueError
-            If there is no image in it, or an argument is out of range.
+            If the file has no image, or an argument is out of range.
         RuntimeError
             If starpipe has a bug.
         """

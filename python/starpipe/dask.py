@@ -1,8 +1,8 @@
 """Archives of frames on Dask and object stores.
 
-A task is a part of the frames: it fetches them through fsspec, solves them, and writes its rows as
-two Parquet files. No result of a frame travels through the scheduler. Parts that are written are
-not repeated, so the same call continues a run that was stopped.
+A task processes a part of the frames: it fetches them through fsspec, solves them, and writes its
+rows as two Parquet files. Results of frames are not sent through the scheduler. Parts that are
+written are not repeated, so the same call continues a run that was stopped.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ CHECKSUMS = "checksums"
 """Directory of the checksums of each part's tables."""
 
 TIME_LIMIT_S = 60.0
-"""How long a frame may take by default."""
+"""Default time limit for a frame."""
 
 TRIES = 5
 """How often an object is fetched or written before a task fails."""
@@ -52,7 +52,7 @@ FINAL = (
     IsADirectoryError,
     NotImplementedError,
 )
-"""Errors that another try does not mend."""
+"""Errors after which a part is not tried again."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class Archive:
     Parameters
     ----------
     out : str
-        Where they are: a directory or a URL.
+        Directory or URL of the tables.
     storage_options : dict, optional
-        Options of fsspec for it.
+        Options of fsspec for this directory.
     """
 
     def __init__(self, out: str, storage_options: dict[str, Any] | None = None) -> None:
@@ -131,7 +131,7 @@ def process(
     frames : str or iterable of str
         A pattern (``s3://night/**/*.fits``), or the names of the frames: paths or URLs.
     out : str
-        Where to write: a directory or a URL. It belongs to this list of frames and these arguments;
+        Directory or URL to write to. It belongs to this list of frames and these arguments;
         existing parts are not repeated.
     client : dask.distributed.Client, optional
         Client whose workers process the parts; without one, this process does.
@@ -140,7 +140,7 @@ def process(
     camera : path, optional
         A description of the camera; workers get its content.
     frames_per_part : int
-        Frames of a task.
+        Frames per task.
     storage_options : dict, optional
         Options of fsspec, for frames and output.
     read_ahead : int
@@ -150,9 +150,9 @@ def process(
         How often a part is tried again.
     page : int or 'all', optional
         Which image of a file with several, from 1; or all, which are named ``FRAME[1]`` and so on.
-        Without it the first.
+        By default the first.
     **options
-        What is stated of all frames, see `SolveOptions`; `time_limit` is 60 seconds by default.
+        Options for all frames, see `SolveOptions`; `time_limit` is 60 seconds by default.
 
     Returns
     -------
@@ -228,7 +228,9 @@ def _claim(job: _Job, plan: _starpipe.ArchivePlan) -> None:
     differences = _starpipe.archive_differences(found, plan.identity)
     if differences:
         told = ", ".join(differences)
-        raise ValueError(f"{job.out} holds another run: {told}; choose another output")
+        raise ValueError(
+            f"{job.out} has the results of a run with other settings: {told}; choose another output"
+        )
     inputs = f"{root}/inputs.txt"
     if not _again(lambda: filesystem.exists(inputs)):
         _write(filesystem, inputs, ("\n".join(plan.names) + "\n").encode())

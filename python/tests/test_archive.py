@@ -108,8 +108,8 @@ def test_a_cluster_writes_the_same_and_a_rerun_does_nothing(night, alone, tmp_pa
 
 def test_an_output_of_another_run_is_refused(night, alone, tmp_path):
     for change, message in [
-        ({"fov": 11.0}, "fov_deg is null there, but 11.0 here"),
-        ({"frames_per_part": 5}, "frames_per_part is 4 there, but 5 here"),
+        ({"fov": 11.0}, "fov_deg was null, now 11.0"),
+        ({"frames_per_part": 5}, "frames_per_part was 4, now 5"),
     ]:
         arguments = {"frames_per_part": PER_PART} | change
         with pytest.raises(ValueError, match=message):

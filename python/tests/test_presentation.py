@@ -238,7 +238,7 @@ def test_files_are_not_replaced_unless_it_is_wanted(pipeline, result, pixels, tm
         assert path.read_bytes() == content
         with pytest.raises(OSError):
             write(tmp_path / "no directory" / "file")
-        with pytest.raises(ValueError, match="restored by pickle"):
+        with pytest.raises(ValueError, match="unpickled result"):
             getattr(pickle.loads(pickle.dumps(result)), write.__name__)(
                 tmp_path / "other", **{} if write == result.write_regions else {"image": pixels}
             )

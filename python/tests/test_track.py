@@ -99,7 +99,7 @@ def test_masters_are_applied_to_each_frame(pipeline, turning, tmp_path):
 
 
 def test_wrong_arguments_are_refused(pipeline, turning, tmp_path):
-    with pytest.raises(ValueError, match="stars must be a whole number from 4 on"):
+    with pytest.raises(ValueError, match="stars must be a whole number of at least 4"):
         sp.Tracker(pipeline, stars=3)
     with pytest.raises(ValueError, match="fov must be more than 0"):
         sp.Tracker(pipeline, fov=-1)

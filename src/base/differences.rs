@@ -12,7 +12,7 @@ pub(crate) fn differences(found: &Value, wanted: &Value) -> Vec<String> {
 fn compare(name: &str, found: &Value, wanted: &Value, into: &mut Vec<String>) {
     let (Value::Object(found), Value::Object(wanted)) = (found, wanted) else {
         if found != wanted {
-            into.push(format!("{name} is {found} there, but {wanted} here"));
+            into.push(format!("{name} was {found}, now {wanted}"));
         }
         return;
     };

@@ -36,7 +36,7 @@ pub enum DateError {
         text: String,
     },
     /// The year is outside [`YEARS`].
-    #[error("the year {year} is not from {} to {}", YEARS.start(), YEARS.end())]
+    #[error("the year {year} is outside the supported range, {} to {}", YEARS.start(), YEARS.end())]
     OutOfRange {
         /// The year found.
         year: i16,

@@ -244,7 +244,7 @@ impl fmt::Display for ExposureMismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the dark {} was exposed for {} s and the frame for {} s: the dark current differs",
+            "the dark {} was exposed for {} s, but the frame for {} s: the dark current differs",
             self.dark, self.dark_exposure_s, self.frame_exposure_s
         )
     }

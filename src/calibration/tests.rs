@@ -120,7 +120,7 @@ fn a_dark_of_another_exposure_gets_a_note() {
             .exposure_mismatch(Some(1.0))
             .unwrap()
             .to_string()
-            .starts_with("the dark master.fits was exposed for 10 s and the frame for 1 s")
+            .starts_with("the dark master.fits was exposed for 10 s, but the frame for 1 s")
     );
 }
 

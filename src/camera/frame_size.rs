@@ -8,7 +8,7 @@ use crate::base::size::Size;
 pub enum FrameSizeError {
     /// The frame is stated to have another size than the camera's frames.
     #[error(
-        "the frame is stated to be {}, and the camera's frames have {} × {} pixels",
+        "the frame size was given as {}, but the camera description says {} × {} pixels",
         sides(*stated), camera.width, camera.height
     )]
     Contradiction {
@@ -19,8 +19,8 @@ pub enum FrameSizeError {
     },
     /// The camera's data sheet and its lens are of frames of two sizes.
     #[error(
-        "the camera's data sheet says {} × {} pixels, and its lens was measured in frames of {} × {}: \
-         the frame's width and height must be stated",
+        "the camera description says {} × {} pixels, but its lens was measured in frames of {} × {}: give \
+         the width and height of the frame",
         sheet.width, sheet.height, lens.width, lens.height
     )]
     Ambiguous {
@@ -97,12 +97,12 @@ mod tests {
         let error = |stated| agreed_size(stated, &camera).unwrap_err().to_string();
         assert_eq!(
             error([Some(1000), None]),
-            "the frame is stated to be 1000 pixels wide, and the camera's frames have 2592 × 1944 pixels"
+            "the frame size was given as 1000 pixels wide, but the camera description says 2592 × 1944 pixels"
         );
         assert_eq!(
             error([Some(2592), Some(1945)]),
-            "the frame is stated to be 2592 pixels wide and 1945 pixels high, and the camera's frames \
-             have 2592 × 1944 pixels"
+            "the frame size was given as 2592 pixels wide and 1945 pixels high, but the camera description \
+             says 2592 × 1944 pixels"
         );
     }
 
@@ -110,7 +110,10 @@ mod tests {
     fn a_lens_of_other_frames_than_the_data_sheets_leaves_the_size_open() {
         let sizes = [Size::new(2592, 1944), Size::new(1296, 972)];
         let error = agreed_size([None, None], &sizes).unwrap_err();
-        assert!(error.to_string().contains("must be stated"), "{error}");
+        assert!(
+            error.to_string().contains("give the width and height"),
+            "{error}"
+        );
         let binned = agreed_size([Some(1296), None], &sizes);
         assert_eq!(binned, Ok([Some(1296), Some(972)]));
         let same = [Size::new(2592, 1944); 2];

@@ -134,7 +134,7 @@ impl KnownLens {
                 distortion.coefficients_px()
             );
         }
-        text += "# Of the natural logarithm of the focal length, and of the terms in pixels.\ncovariance = [\n";
+        text += "# Covariance matrix of ln(focal_length_px) and terms_px.\ncovariance = [\n";
         for row in self.covariance.row_iter() {
             let row: Vec<String> = row.iter().map(|value| format!("{value:e}")).collect();
             let _ = writeln!(text, "    [{}],", row.join(", "));

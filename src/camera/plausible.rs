@@ -33,7 +33,8 @@ pub enum ImplausibleLens {
     },
     /// The picture is stretched.
     #[error(
-        "the ratio of the focal lengths along two directions of the frame is {ratio:.3}; expected square pixels, to 25 %"
+        "the ratio of the focal lengths along two directions of the frame is {ratio:.3}; expected square \
+         pixels, within 25 %"
     )]
     Stretch {
         /// The larger one over the other.
@@ -41,7 +42,9 @@ pub enum ImplausibleLens {
     },
     /// The distortion images two directions at one place.
     #[error(
-        "the distortion folds the picture {angle_deg:.2}° from the axis, at ({x_px:.0}, {y_px:.0}) px; reduce the distortion, or state the angle up to which the lens is known (valid_to_deg)"
+        "the distortion is not monotonic: at {angle_deg:.2}° from the axis, ({x_px:.0}, {y_px:.0}) px, the \
+         image folds back; reduce the distortion, or set valid_to_deg to the angle up to which the lens is \
+         known"
     )]
     Fold {
         /// The last angle from the axis that is imaged there.

@@ -46,7 +46,7 @@ impl Contents {
 
 fn check_range(star: &Star) -> Result<(), CatalogError> {
     let mag = (MAG_LIMIT, "-32 to 32 mag");
-    let motion = (PM_LIMIT_MAS_PER_YR, "at most 32767 mas a year either way");
+    let motion = (PM_LIMIT_MAS_PER_YR, "-32767 to 32767 mas/yr");
     let excess_length = star.direction.as_vector().norm() as f32 - 1.0;
     for (quantity, value, (limit, expected)) in [
         ("V", star.v_mag, mag),
@@ -54,7 +54,7 @@ fn check_range(star: &Star) -> Result<(), CatalogError> {
         ("proper motion in RA", star.pm_ra_mas_per_yr, motion),
         ("proper motion in Dec", star.pm_dec_mas_per_yr, motion),
         (
-            "the direction's length less 1",
+            "length of the direction vector minus 1",
             excess_length,
             (1e-6, "0, within 1e-6"),
         ),
@@ -92,7 +92,7 @@ fn resolve_names(
             return bad(name, "the name of a star in the catalog");
         };
         if previous.replace(id) == Some(id) {
-            return bad(name, "one name for a star");
+            return bad(name, "one name per star");
         }
         if name.is_empty() || name.len() > NAME_BYTES_MAX {
             return bad(name, "a name of 1 to 255 bytes");

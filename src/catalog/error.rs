@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{fmt, io};
 
 /// The readable kinds of files, for messages.
-const KINDS_READ: &str = "a compact catalog of starpipe, SKY2000 records of 520 bytes, the files of \
+const KINDS_READ: &str = "a compact starpipe catalog, SKY2000 records of 520 bytes, the files of \
      Tycho-2, or a table with headings for identifiers, right ascension, declination and magnitude, \
      plain or gzip";
 /// The kinds of files that can be imported, for messages.
@@ -83,7 +83,8 @@ pub enum CatalogError {
     },
     /// Too many records are unreadable.
     #[error(
-        "{}: {}{} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first: {}",
+        "{}: {}{} of {records} records are unreadable, at most {limit_percent} % are tolerated; the first \
+         ones: {}",
         path.display(), reason.as_ref().map_or(String::new(), |reason| format!("{reason}; ")),
         errors.len(), first_of(errors)
     )]
@@ -147,7 +148,7 @@ pub enum CatalogError {
         expected: &'static str,
     },
     /// Two stars have the same identifier.
-    #[error("star {id} occurs twice; expected every identifier once")]
+    #[error("star {id} occurs twice; identifiers must be unique")]
     DuplicateStar {
         /// The identifier.
         id: StarId,
@@ -201,7 +202,7 @@ impl CatalogError {
         Self::UnknownKind {
             path: path.to_owned(),
             found: if head.is_empty() {
-                "nothing: it is empty".to_owned()
+                "nothing: the file is empty".to_owned()
             } else {
                 quoted(&head[..head.len().min(SHOWN_BYTES)])
             },
@@ -213,7 +214,7 @@ impl CatalogError {
     pub(super) fn already_compact(path: &Path) -> Self {
         Self::UnknownKind {
             path: path.to_owned(),
-            found: "the mark of a compact catalog, which is imported already".to_owned(),
+            found: "the signature of a compact catalog, which is already imported".to_owned(),
             expected: KINDS_IMPORTED,
         }
     }

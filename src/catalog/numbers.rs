@@ -43,7 +43,7 @@ impl NumberColumns {
     fn open(bytes: &'static [u8]) -> Result<Self, CompactError> {
         if bytes.len() < HEADER_BYTES || !bytes.starts_with(&MAGIC) {
             let found = quoted(&bytes[..bytes.len().min(MAGIC.len())]);
-            return invalid(0, found, format!("the mark {}", quoted(&MAGIC)));
+            return invalid(0, found, format!("the signature {}", quoted(&MAGIC)));
         }
         let mut file = ByteReader {
             bytes,

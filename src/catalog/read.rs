@@ -225,7 +225,7 @@ fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
 /// Describes a directory without exactly one catalogue.
 fn contents_of(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
     if others.is_empty() {
-        return "no catalog is in it".to_owned();
+        return "found no catalog in it".to_owned();
     }
     let names: Vec<String> = tycho2
         .iter()
@@ -233,7 +233,10 @@ fn contents_of(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
         .chain(others.iter().take(3))
         .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
         .collect();
-    format!("more than one catalog is in it ({}, ...)", names.join(", "))
+    format!(
+        "found more than one catalog in it ({}, ...)",
+        names.join(", ")
+    )
 }
 
 /// The title of a catalogue, with the file name, which alone tells the version.

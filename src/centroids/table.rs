@@ -221,17 +221,15 @@ impl<'a> Frames<'a> {
             None if count > 1 => Err(CentroidListError {
                 remedies: &[Remedy::Frame],
                 ..CentroidListError::of_list(format!(
-                    "found the rows of {count} frames ({names}), expected those of one"
+                    "found rows of {count} frames ({names}), expected rows of one frame"
                 ))
             }),
             Some(chosen) if count == 0 => Err(CentroidListError::of_list(format!(
-                "found no column that names a frame, expected rows of {chosen}"
+                "found no column with frame names, expected rows of {chosen}"
             ))),
-            Some(chosen) if !self.found.iter().any(|frame| frame == chosen) => {
-                Err(CentroidListError::of_list(format!(
-                    "found rows of {names}, expected some of {chosen}"
-                )))
-            }
+            Some(chosen) if !self.found.iter().any(|frame| frame == chosen) => Err(
+                CentroidListError::of_list(format!("found rows of {names}, but none of {chosen}")),
+            ),
             _ => Ok(()),
         }
     }
@@ -328,13 +326,10 @@ mod tests {
     fn one_frame_of_a_table_must_be_chosen() {
         assert_eq!(
             error(TABLE),
-            "found the rows of 2 frames (a.png, b.png), expected those of one"
+            "found rows of 2 frames (a.png, b.png), expected rows of one frame"
         );
         let missing = of_frame("c.png").unwrap_err().to_string();
-        assert_eq!(
-            missing,
-            "found rows of a.png, b.png, expected some of c.png"
-        );
+        assert_eq!(missing, "found rows of a.png, b.png, but none of c.png");
         let one: String = TABLE
             .lines()
             .take(3)

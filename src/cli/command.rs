@@ -60,8 +60,8 @@ pub(crate) enum Command {
         starpipe sky --site 52.22,4.42 --camera camera.toml --format json night.fits > sky.jsonl\n\n\
         Options and report are those of `starpipe process`, with the sky added. --out also writes FRAME.sky.svg.\n\
         If site and time are known, the sky of a wide field is divided by altitude and azimuth, otherwise by\n\
-        columns and rows of the frame. The brightness needs the dark level (bias and dark current): --dark or\n\
-        --camera. It is measured in the frame if an all-sky lens leaves the corners unlit.")]
+        columns and rows of the frame. The brightness needs the dark level (bias and dark current): from\n\
+        --dark or --camera, or from the corners of the frame if an all-sky lens leaves them unlit.")]
     Sky(Box<ProcessArgs>),
     /// Measure a night of a fixed camera: sky, clouds, limiting magnitude, pointing, and when they changed
     Night(Box<NightArgs>),
@@ -79,7 +79,7 @@ pub(crate) enum Command {
     Limit(Box<LimitArgs>),
     /// Write and list descriptions of cameras
     Camera(CameraArgs),
-    /// Repeat an experiment of the sensitivity paper: its limiting magnitude, its stars, and simulated frames
+    /// Repeat an experiment of Tong, Li & Wang (2014): limiting magnitude, stars, and simulated frames
     Experiment(ExperimentArgs),
     /// Simulate frames of a camera, with tables of the stars and other objects in them
     Simulate(Box<SimulateArgs>),
@@ -103,9 +103,9 @@ pub(crate) enum Command {
     ValidateClutter(Box<ClutterArgs>),
     /// Find the spot radius with the smallest centroid error, and the defocus that gives it
     Defocus(Box<DefocusArgs>),
-    /// Measure noise, pattern, dark current and hot pixels on frames taken without light
+    /// Measure read noise, fixed-pattern noise, dark current and hot pixels on dark frames
     Darks(DarksArgs),
-    /// Make a master flat from evenly lit frames, and measure gain and response
+    /// Make a master flat from flat-field frames, and measure the gain and the pixel response
     Flats(FlatsArgs),
     #[cfg(feature = "shell")]
     /// Write a script that completes commands and options in a shell

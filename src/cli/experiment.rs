@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
     starpipe experiment 1\n  \
     starpipe experiment 2 --count 200 --format json > experiment-2.json\n  \
     starpipe experiment 1 --out results\n\n\
-    The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). The frames are simulated \
-    with its camera and sky at the pointing of its table of stars, and identified without hints. \
-    The stars have SKY2000 numbers: with another --catalog they have other numbers.")]
+    The paper is Tong, Li & Wang, Acta Optica Sinica 34, 1004003 (2014). Frames are simulated with the \
+    camera and the sky of the paper, at the pointing of its table of stars, and identified without hints. \
+    Stars are listed by their SKY2000 numbers; with another --catalog the numbers differ.")]
 pub(crate) struct ExperimentArgs {
     /// Which of the paper's two experiments
     #[arg(value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]

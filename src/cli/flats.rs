@@ -24,19 +24,20 @@ const MASTER: &str = "master-flat.fits";
 #[command(after_help = "Examples:\n  \
     starpipe flats --dark master-dark.fits --out calibration flats/\n  \
     starpipe flats --camera camera.toml --format json dim-1.fits dim-2.fits bright-1.fits bright-2.fits\n\n\
-    --out writes master-flat.fits, with a mean of 1, for the option --flat of `starpipe process`. The first and second \
-    frame are a pair with the same light, and so on: the gain follows from the noise of such pairs, and if they have \
-    different light, without knowing the read noise.")]
+    --out writes master-flat.fits, with a mean of 1, for the option --flat of `starpipe process`. Frames \
+    are taken in pairs (first and second, third and fourth, ...) with equal illumination within a pair. The \
+    gain follows from the noise of the pairs. If the illumination differs from pair to pair, the read noise \
+    need not be known.")]
 pub(crate) struct FlatsArgs {
     #[command(flatten)]
     frames: FrameOptions,
     #[command(flatten)]
     page: PageOption,
-    /// Frame taken without light, or the mean of many; see `starpipe darks`
+    /// Dark frame or master dark to subtract; see `starpipe darks`
     #[arg(long, value_name = "FILE")]
     dark: Option<PathBuf>,
-    /// Description of the camera, see `starpipe camera new`: its bias if there is no --dark, and
-    /// its read noise
+    /// Description of the camera, see `starpipe camera new`: its bias is used if there is no --dark,
+    /// and its read noise
     #[arg(long, value_name = "FILE.toml")]
     camera: Option<PathBuf>,
     /// What to print: csv has a row for each frame
@@ -104,7 +105,11 @@ fn master(flats: &Flats, dark: Option<&Path>) -> anyhow::Result<Vec<u8>> {
     if let Some(gain) = flats.gain {
         header.real("GAIN", gain.e_per_adu, "[e/ADU] by photon transfer");
     }
-    header.real("RMS", flats.nonuniformity, "of the response, of its mean");
+    header.real(
+        "RMS",
+        flats.nonuniformity,
+        "standard deviation of the response",
+    );
     header.history(&format!(
         "Mean response of each pixel over {} frames, by starpipe flats {}; dark: {}",
         flats.frames.len(),

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(crate) struct HtmlOption {
     /// Also write a page for a browser: the result, its notes, figures and tables in one file
-    /// [default FILE: named as the command, beside the other results]
+    /// [default FILE: named after the command, next to the other results]
     #[arg(long, value_name = "FILE.html", require_equals = true, value_parser = page_name)]
     html: Option<Option<PathBuf>>,
 }
@@ -28,7 +28,7 @@ fn page_name(text: &str) -> Result<PathBuf, String> {
     let extension = path.extension().and_then(OsStr::to_str);
     match extension.map(str::to_ascii_lowercase).as_deref() {
         Some("html" | "htm") => Ok(path),
-        _ => Err("pages are .html".to_owned()),
+        _ => Err("expected a file name ending in .html".to_owned()),
     }
 }
 
@@ -171,6 +171,9 @@ mod tests {
     #[test]
     fn a_page_is_html() {
         assert!(page_name("a.html").is_ok() && page_name("A.HTM").is_ok());
-        assert_eq!(page_name("night.fits").unwrap_err(), "pages are .html");
+        assert_eq!(
+            page_name("night.fits").unwrap_err(),
+            "expected a file name ending in .html"
+        );
     }
 }

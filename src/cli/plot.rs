@@ -40,7 +40,7 @@ impl PlotFile {
         let form = match extension.to_ascii_lowercase().as_str() {
             "svg" => Form::Svg,
             "png" => Form::Png,
-            _ => return Err("figures are .svg or .png".to_owned()),
+            _ => return Err("expected a file name ending in .svg or .png".to_owned()),
         };
         Ok(Self { path, form })
     }

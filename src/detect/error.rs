@@ -28,11 +28,12 @@ pub enum DetectError {
         found: usize,
     },
     /// The work was ended early.
-    #[error("not finished within the time limit for a frame")]
+    #[error("not finished within the time limit per frame")]
     Interrupted(#[from] Interrupted),
     /// More pixels stand out than fit the memory that the workspace allows.
     #[error(
-        "more than {most} pixels are above the detection threshold, which needs too much memory: use a higher threshold"
+        "more than {most} pixels are above the detection threshold, and measuring them needs too much \
+         memory: use a higher threshold"
     )]
     TooCrowded {
         /// How many may stand out.

@@ -106,7 +106,7 @@ pub enum FrameError {
         limit_bytes: u64,
     },
     /// The work was ended early.
-    #[error("not done within the time limit of a frame")]
+    #[error("not finished within the time limit per frame")]
     Interrupted(#[from] Interrupted),
     /// More bytes than the largest frame needs.
     #[error("too large: found more than {limit} bytes, expected at most {limit}")]

@@ -73,7 +73,8 @@ impl fmt::Display for Assumption {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::FourPlanes => f.write_str(
-                "four planes were read as red, green, blue and one that is ignored; page selects a single plane",
+                "the first three of four planes were read as red, green and blue, and the fourth was \
+                 ignored; the option page selects a single plane",
             ),
             Self::DayFirst { keyword, found } => write!(
                 f,
@@ -103,14 +104,14 @@ impl fmt::Display for ImageChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([width, height], [first_width, first_height]) = (self.size_px, self.first_px);
         let attached = if self.is_attached {
-            "the one attached to "
+            "the image attached to "
         } else {
             ""
         };
         write!(
             f,
-            "the largest of {} images in the file was read: {attached}page {}, of {width} × {height} pixels; \
-             the first has {first_width} × {first_height}",
+            "the largest of {} images in the file was read: {attached}page {}, {width} × {height} pixels; \
+             the first image has {first_width} × {first_height} pixels",
             self.images, self.page
         )
     }
@@ -231,7 +232,7 @@ impl FrameMetadata {
             self.ignore(
                 keywords,
                 text,
-                "a site other than 0, 0, which means that it is not set",
+                "a site other than 0, 0 (which usually means that none is set)",
             );
             return None;
         }

@@ -80,8 +80,8 @@ impl Pages {
             (MAX_PAGES.., Some(format)) => {
                 return Err(FrameError::Unsupported {
                     format,
-                    found: format!("{MAX_PAGES} images or more in it"),
-                    expected: "fewer, or a page that says which",
+                    found: format!("{MAX_PAGES} or more images in the file"),
+                    expected: "fewer, or a page number that selects one",
                 });
             }
             _ => {}

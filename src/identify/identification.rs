@@ -187,7 +187,7 @@ pub struct StarMatch {
 #[non_exhaustive]
 pub enum SearchFailure {
     /// Fewer stars than identification needs.
-    #[error("{found} stars are too few to identify; {needed} are needed")]
+    #[error("too few stars to identify the frame: found {found}, at least {needed} are needed")]
     TooFewStars {
         /// Stars found.
         found: usize,
@@ -201,7 +201,7 @@ pub enum SearchFailure {
         best_log10_false_alarm: Option<f64>,
     },
     /// A pointing was found, but too few stars have a sure name under it.
-    #[error("a pointing matches the brightest stars, but too few other stars confirm it")]
+    #[error("a pointing matches the brightest stars, but too few of the other stars confirm it")]
     NotConfirmed {
         /// log10 of its false-alarm probability.
         log10_false_alarm: f64,

@@ -18,7 +18,9 @@ pub enum StudyError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// There is no limit: noise alone is detected more often than not.
-    #[error("there is no limiting magnitude: noise alone is detected at half of all positions")]
+    #[error(
+        "there is no limiting magnitude: noise alone is detected at half or more of all positions"
+    )]
     NoLimit,
     /// A frame cannot be simulated or recorded.
     #[error("simulating a frame")]

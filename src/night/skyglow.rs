@@ -82,7 +82,7 @@ fn header(station: &SkyglowStation) -> String {
         "Moving / Stationary position: STATIONARY".to_owned(),
         "Moving / Fixed look direction: FIXED".to_owned(),
         "Number of channels: 1".to_owned(),
-        "Filters per channel: V (by stars of the frame)".to_owned(),
+        "Filters per channel: V (calibrated with the stars of the frame)".to_owned(),
         "Measurement direction per channel: 0., 0.".to_owned(),
         "Field of view (degrees): 20".to_owned(),
         "Number of fields per line: 6".to_owned(),
@@ -93,10 +93,10 @@ fn header(station: &SkyglowStation) -> String {
         "SQM readout test rx: none".to_owned(),
         "SQM readout test cx: none".to_owned(),
         format!(
-            "Comment: starpipe {} by the stars of each frame of a camera",
+            "Comment: measured by starpipe {} with the stars in each camera frame",
             env!("CARGO_PKG_VERSION")
         ),
-        "Comment: temperature, counts and frequency are 0 as they are not known".to_owned(),
+        "Comment: temperature, counts and frequency are not known and written as 0".to_owned(),
         "Comment: ".to_owned(),
         "Comment: ".to_owned(),
         "Comment: ".to_owned(),

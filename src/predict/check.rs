@@ -73,7 +73,7 @@ impl Scenario {
                 .uncovered(light::PAPER_BAND_NM.0, light::PAPER_BAND_NM.1),
             Reading::Physical => None,
         };
-        uncovered.map(|uncovered| format!("{uncovered} of the paper's reading"))
+        uncovered.map(|uncovered| format!("{uncovered} of the paper's equations (reading paper)"))
     }
 }
 

@@ -22,28 +22,28 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     },
     Key {
         name: "sky_luminance_cd_m2",
-        about: "the same as a luminance, in cd/m²",
+        about: "brightness of the sky as a luminance, in cd/m²",
         limits: NumberRange::Positive,
         get: |conditions| Some(conditions.sky.luminance_cd_m2()),
         set: |conditions, luminance| conditions.sky = SkyBrightness::LuminanceCdM2(luminance),
     },
     Key {
         name: "sky_illuminance_lx",
-        about: "the same as the illuminance of level ground, in lx",
+        about: "brightness of the sky as the illuminance of level ground, in lx",
         limits: NumberRange::Positive,
         get: |conditions| Some(conditions.sky.illuminance_lx()),
         set: |conditions, illuminance| conditions.sky = SkyBrightness::IlluminanceLx(illuminance),
     },
     Key {
         name: "zenith_transmission",
-        about: "transmission of one airmass at 555 nm, by the law of eq. (3)",
+        about: "transmission of one airmass at 555 nm (extinction law: eq. 3 of the paper)",
         limits: NumberRange::Share,
         get: |conditions| Some(conditions.extinction.zenith_transmission(REFERENCE_NM)),
         set: |conditions, part| conditions.extinction = Extinction::law_through(part),
     },
     Key {
         name: "extinction_mag_per_airmass",
-        about: "extinction, in magnitudes per airmass, the same at every wavelength",
+        about: "extinction, in magnitudes per airmass, at every wavelength",
         limits: NumberRange::NotNegative,
         get: |conditions| match conditions.extinction {
             Extinction::MagPerAirmass(mag) => Some(mag),
@@ -54,7 +54,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     key!(
         star_temperature_k,
         NumberRange::Positive,
-        "color temperature of the star, in kelvin (physical reading)"
+        "color temperature of the star, in kelvin (for reading physical)"
     ),
     key!(
         motion_px,
@@ -64,7 +64,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
     key!(
         snr,
         NumberRange::Positive,
-        "signal-to-noise ratio in the brightest pixel required for a detection"
+        "signal-to-noise ratio required in the brightest pixel"
     ),
     key!(
         false_alarms_per_mpx,
@@ -76,7 +76,7 @@ pub const CONDITION_KEYS: &[Key<Conditions>] = &[
 /// Pixel area, for sweeps: pixels of another size under the same spot.
 const PIXEL_AREA: Key<DataSheet> = Key {
     name: "pixel_area_um2",
-    about: "area of a pixel, in µm²; its form and the spot's size in µm stay",
+    about: "area of a pixel, in µm²; keeps its shape, and the spot size in µm",
     limits: NumberRange::Positive,
     get: |sheet| Some(sheet.pitch_x_um * sheet.pitch_y_um),
     set: |sheet, area_um2| {
@@ -158,7 +158,7 @@ const EXCLUSIVE: &[&[&str]] = &[
 
 /// There is no parameter of this name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("'{name}' is not a parameter{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
+#[error("unknown parameter '{name}'{}", match .nearest { Some(known) => format!("; did you mean '{known}'?"), None => String::new() })]
 pub struct UnknownParameter {
     /// The name.
     pub name: String,
@@ -294,7 +294,7 @@ mod tests {
         let error = Parameter::named("aperture").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "'aperture' is not a parameter; did you mean 'aperture_mm'?"
+            "unknown parameter 'aperture'; did you mean 'aperture_mm'?"
         );
     }
 

@@ -84,13 +84,13 @@ pub enum SweepError {
     #[error(transparent)]
     Unknown(#[from] UnknownParameter),
     /// Fewer than two values, or too many.
-    #[error("a sweep of {count} values, expected 2 to {}", Sweep::MAX_VALUES)]
+    #[error("the sweep has {count} values, expected 2 to {}", Sweep::MAX_VALUES)]
     Count {
         /// Number of values.
         count: usize,
     },
     /// The values do not increase.
-    #[error("the sweep runs from {from} to {to}, expected a rising one")]
+    #[error("the sweep runs from {from} to {to}, expected increasing values")]
     Backwards {
         /// The first value.
         from: f64,
@@ -108,7 +108,7 @@ pub enum SweepError {
         expected: NumberRange,
     },
     /// Logarithmic spacing needs values above 0.
-    #[error("logarithmic steps from {from}, expected a start above 0")]
+    #[error("the logarithmic sweep starts at {from}, expected a start above 0")]
     LogOfNothing {
         /// The first value.
         from: f64,
@@ -261,19 +261,19 @@ mod tests {
         for (found, expected) in [
             (
                 sweep("apertur", 5.0, 200.0, 40),
-                "'apertur' is not a parameter; did you mean 'aperture_mm'?",
+                "unknown parameter 'apertur'; did you mean 'aperture_mm'?",
             ),
             (
                 sweep("aperture_mm", 200.0, 5.0, 40),
-                "from 200 to 5, expected a rising one",
+                "from 200 to 5, expected increasing values",
             ),
             (
                 sweep("aperture_mm", 5.0, f64::NAN, 40),
-                "to NaN, expected a rising one",
+                "to NaN, expected increasing values",
             ),
             (
                 sweep("aperture_mm", 5.0, 200.0, 1),
-                "a sweep of 1 values, expected 2 to 1000",
+                "the sweep has 1 values, expected 2 to 1000",
             ),
             (
                 sweep("aperture_mm", 5.0, 200.0, 1001),
@@ -290,7 +290,7 @@ mod tests {
             (sweep("bits", 8.0, 9.0, 3), "bits would be 8.5"),
             (
                 Sweep::new("dark_current_e_s", [0.0, 9.0], 3, Spacing::Log),
-                "logarithmic steps from 0",
+                "the logarithmic sweep starts at 0",
             ),
         ] {
             let error = found.unwrap_err().to_string();

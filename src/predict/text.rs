@@ -45,7 +45,7 @@ impl PredictionRow {
     fn budget_text(&self) -> String {
         let prediction = &self.prediction;
         let mut text = format!(
-            "  limit  V {:.2}: its brightest pixel has {} times the noise\n",
+            "  limit  V {:.2}: signal-to-noise ratio of {} in the brightest pixel\n",
             prediction.limit_vmag,
             five_digits(prediction.snr),
         );
@@ -102,9 +102,9 @@ fn budget_parts(prediction: &Prediction) -> [(&'static str, Vec<Line>); 5] {
     [
         ("camera", camera(prediction)),
         ("conditions", conditions(prediction)),
-        ("on the way", on_the_way(&prediction.budget)),
+        ("from star to pixel", on_the_way(&prediction.budget)),
         ("noise of the brightest pixel", noise(&prediction.budget)),
-        ("the faintest star", faintest_star(&prediction.budget)),
+        ("star at the limit", faintest_star(&prediction.budget)),
     ]
 }
 
@@ -112,7 +112,7 @@ fn budget_parts(prediction: &Prediction) -> [(&'static str, Vec<Line>); 5] {
 fn detectors_text(peak: &DetectorReport, filter: &DetectorReport) -> String {
     let mut text = format!(
         "\n  {:<37} {:>20} {:>20}\n",
-        "what is found", "brightest pixel", "starpipe's filter"
+        "stars detected", "brightest pixel", "matched filter"
     );
     let v_mag = |v_mag: Option<f64>| v_mag.map_or("none".to_owned(), |v_mag| format!("{v_mag:.2}"));
     let values = |d: &DetectorReport| {
@@ -124,10 +124,10 @@ fn detectors_text(peak: &DetectorReport, filter: &DetectorReport) -> String {
         ]
     };
     let names = [
-        "half of the stars at V",
-        "nine in ten at V",
+        "50 % of the stars of V",
+        "90 % of the stars of V",
         "threshold, in standard deviations",
-        "false detections in a million pixels",
+        "false detections per million pixels",
     ];
     for ((name, peak), filter) in names.iter().zip(values(peak)).zip(values(filter)) {
         let _ = writeln!(text, "    {name:<36} {peak:>19} {filter:>20}");
@@ -140,7 +140,7 @@ fn faintest_text(faintest: &Faintest) -> String {
     let expected = format!("{:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
     format!(
         "    {:<36} {found:>40}\n    {:<36} {expected:>40}\n",
-        "catalog's stars found in the field", "faintest of them to be expected at V",
+        "catalog stars detected in the field", "expected faintest of these, V",
     )
 }
 
@@ -193,11 +193,21 @@ fn conditions(prediction: &Prediction) -> Vec<Line> {
                 "zenith_transmission",
                 "",
             ),
-            ("E_B", "illuminance by the sky", "sky_illuminance_lx", "lx"),
-            ("", "the same as luminance", "sky_luminance_cd_m2", "cd/m²"),
+            (
+                "E_B",
+                "sky brightness as illuminance",
+                "sky_illuminance_lx",
+                "lx",
+            ),
             (
                 "",
-                "the same in V magnitudes",
+                "sky brightness as luminance",
+                "sky_luminance_cd_m2",
+                "cd/m²",
+            ),
+            (
+                "",
+                "sky brightness in V magnitudes",
                 "sky_mag_arcsec2",
                 "mag/arcsec²",
             ),
@@ -212,7 +222,7 @@ fn on_the_way(budget: &Budget) -> Vec<Line> {
         ("X", "airmass", budget.airmass, ""),
         (
             "",
-            "transmission of the atmosphere, for a star's electrons",
+            "transmission of the atmosphere, weighted by electrons",
             through_air,
             "",
         ),
@@ -230,49 +240,59 @@ fn on_the_way(budget: &Budget) -> Vec<Line> {
         ),
         (
             "",
-            "the same in square arcseconds",
+            "solid angle of a pixel in square arcseconds",
             budget.pixel_area_arcsec2,
             "arcsec²",
         ),
         (
             "μ",
-            "part of a star's light on its brightest pixel",
+            "fraction of a star's light in its brightest pixel",
             budget.peak_share,
             "",
         ),
         (
             "Φ₀",
-            "photons of V = 0 above the atmosphere",
+            "photons of a star of V = 0 above the atmosphere",
             budget.mag_0_photons_s_m2,
             "/ s m²",
         ),
         (
             "",
-            "electrons of V = 0 on all its pixels",
+            "electrons of a star of V = 0 in all its pixels",
             budget.mag_0_e_s,
             "e/s",
         ),
-        ("M_B", "magnitude as bright as the sky", budget.sky_mag, ""),
+        (
+            "M_B",
+            "magnitude of a star with the illuminance of the sky",
+            budget.sky_mag,
+            "",
+        ),
     ]
 }
 
 fn noise(budget: &Budget) -> Vec<Line> {
-    let of_sensor = "noise of the sensor: dark current, readout, rounding";
+    let of_sensor = "detector noise: dark current, readout, quantization";
     vec![
-        ("B", "electrons of the sky", budget.background_e, "e"),
-        ("n_B", "their shot noise", budget.sky_noise_e, "e"),
-        ("", "electrons of the dark current", budget.dark_e, "e"),
-        ("", "read noise", budget.read_noise_e, "e"),
         (
-            "",
-            "rounding noise (quantization)",
-            budget.quantisation_noise_e,
+            "B",
+            "electrons from the sky background",
+            budget.background_e,
             "e",
         ),
+        (
+            "n_B",
+            "shot noise of the sky background",
+            budget.sky_noise_e,
+            "e",
+        ),
+        ("", "electrons from dark current", budget.dark_e, "e"),
+        ("", "read noise", budget.read_noise_e, "e"),
+        ("", "quantization noise", budget.quantisation_noise_e, "e"),
         ("N_C", of_sensor, budget.sensor_noise_e, "e"),
         (
             "",
-            "noise of sky and sensor",
+            "noise of sky background and detector",
             budget.background_noise_e,
             "e",
         ),
@@ -284,23 +304,18 @@ fn noise(budget: &Budget) -> Vec<Line> {
 fn faintest_star(budget: &Budget) -> Vec<Line> {
     let below = budget.star_illuminance_ground_lx;
     vec![
-        (
-            "S",
-            "its electrons on its brightest pixel",
-            budget.star_e,
-            "e",
-        ),
-        ("M_V", "its magnitude", budget.limit_vmag, ""),
+        ("S", "electrons in the brightest pixel", budget.star_e, "e"),
+        ("M_V", "V magnitude", budget.limit_vmag, ""),
         (
             "E",
-            "its illuminance above the atmosphere",
+            "illuminance above the atmosphere",
             budget.star_illuminance_lx,
             "lx",
         ),
-        ("E'", "its illuminance below the atmosphere", below, "lx"),
+        ("E'", "illuminance below the atmosphere", below, "lx"),
         (
             "φ_S",
-            "its photons below the atmosphere",
+            "photons below the atmosphere",
             budget.star_photons_s_m2,
             "/ s m²",
         ),

@@ -203,7 +203,7 @@ impl LensReport {
         if self.directions < self.frames.len() {
             let _ = write!(
                 text,
-                " for {} frames; errors of {:.3} px are common to frames of one direction",
+                " for {} frames; frames of the same direction share an error of {:.3} px",
                 self.frames.len(),
                 self.common_sigma_px
             );
@@ -213,7 +213,8 @@ impl LensReport {
         } else if self.direction_scatter > 1.0 {
             let _ = write!(
                 text,
-                "; they differ by {:.2} standard errors, and the stated errors are increased by this factor",
+                "; the lens differs between directions by {:.2} standard errors, and the stated errors are \
+                 increased by this factor",
                 self.direction_scatter
             );
         }
@@ -251,8 +252,8 @@ impl LensReport {
                 ),
             ),
             (
-                "stars in",
-                format!("{:.0} % of the frame", 100.0 * self.coverage),
+                "coverage",
+                format!("stars in {:.0} % of the frame", 100.0 * self.coverage),
             ),
             ("directions", self.directions_text()),
         ];
@@ -267,7 +268,7 @@ impl LensReport {
             lines.push((
                 "drift",
                 format!(
-                    "scale {:+.2} ± {:.2} ppm per day; scatter of the frames {:.2} standard errors",
+                    "scale {:+.2} ± {:.2} ppm per day; frames scatter by {:.2} standard errors",
                     drift.scale_ppm_per_day, drift.sigma_ppm_per_day, drift.scatter
                 ),
             ));

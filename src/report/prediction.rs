@@ -55,7 +55,7 @@ impl PredictionReport {
         let known = if self.zenith_distance_known {
             ""
         } else {
-            ", zenith assumed"
+            ", assuming it points to the zenith"
         };
         let mut lines = vec![labelled(
             "camera",
@@ -72,7 +72,7 @@ impl PredictionReport {
                 ))
             });
             let text = format!(
-                "limit V {limit:.2}, brightest pixel V {:.2}{}",
+                "limit V {limit:.2} (brightest pixel V {:.2}){}",
                 self.peak_limit50_vmag.unwrap_or(f64::NAN),
                 measured.unwrap_or_default()
             );
@@ -86,7 +86,7 @@ impl PredictionReport {
     fn light_line(&self) -> Option<String> {
         let zero_point = self.zero_point_difference_mag.map(|mag| {
             let off = difference(mag, self.zero_point_difference_sigma_mag);
-            format!("zero point {off} mag from the predicted one")
+            format!("zero point {off} mag relative to the prediction")
         });
         let sky = self.sky_mag_arcsec2.or(self.sky_camera_mag_arcsec2);
         let sky = sky.map(|mag| format!("sky V {mag:.2} mag/arcsec²"));
@@ -97,7 +97,7 @@ impl PredictionReport {
 
 fn expected_line(magnitude: &MagnitudeReport) -> Option<String> {
     let text = format!(
-        "faintest star V {:.2} ± {:.2}; measured minus predicted {:+.2}",
+        "expected faintest star V {:.2} ± {:.2}; measured minus predicted {:+.2}",
         magnitude.expected_faintest_vmag?,
         magnitude.expected_faintest_sigma_mag?,
         magnitude.faintest_difference_mag?,

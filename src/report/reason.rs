@@ -19,12 +19,12 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
         SearchFailure::TooFewStars { found, needed } => too_few(*found, *needed, solution),
         SearchFailure::NoMatch { .. } => no_match(solution),
         SearchFailure::NotConfirmed { .. } => {
-            "stars of the catalog match the brightest detections, but too few of the others confirm it; state the \
-             field of view and the direction if you know them"
+            "catalog stars match the brightest detections, but too few of the other detections confirm the \
+             match; give the field of view and the direction if you know them"
                 .to_owned()
         }
         SearchFailure::Interrupted => {
-            "there was no answer within the time limit of a frame".to_owned()
+            "the search reached the time limit per frame".to_owned()
         }
     }
 }
@@ -32,20 +32,20 @@ fn failure_text(failure: &SearchFailure, solution: &Solution) -> String {
 fn cause_text(cause: &Diagnosis) -> String {
     match cause {
         Diagnosis::NoVariation { level_adu } => format!(
-            "the frame is empty: every pixel has the value {level_adu}; was the lens covered?"
+            "the frame is empty: every pixel has the value {level_adu}; check whether the lens was covered"
         ),
         Diagnosis::Saturated {
             share,
             sky,
             level_adu,
         } => format!(
-            "the frame is overexposed: {:.0} % of the pixels are at full scale, {level_adu}, and the sky is \
-             at {:.0} % of it; a shorter exposure or less light beside the stars is needed",
+            "the frame is overexposed: {:.0} % of the pixels are at full scale, {level_adu}, and the sky \
+             background is at {:.0} % of full scale; use a shorter exposure, or a darker site",
             share * 100.0,
             sky * 100.0
         ),
         Diagnosis::Negative { spots } => format!(
-            "the frame is a negative: {spots} dark spots in it look like stars; invert it, as with \
+            "the frame is a negative: {spots} dark spots in it look like stars; invert it, for example with \
              ImageMagick's `magick negative.png -negate positive.png`"
         ),
         Diagnosis::Trails {
@@ -54,7 +54,7 @@ fn cause_text(cause: &Diagnosis) -> String {
             length_px,
         } => trails_text(*trails, *angle_rad, *length_px),
         Diagnosis::DoubleExposure(double) => format!(
-            "the same stars are there twice, as in a double exposure: {double}; expose once"
+            "every star appears twice, as in a double exposure: {double}; use a single exposure"
         ),
         Diagnosis::TooNarrow {
             fov_x_rad,
@@ -78,31 +78,32 @@ fn picture_text(cause: &Diagnosis) -> String {
             middle_px: [x, y],
             diameter_px,
         } => format!(
-            "a bright disc outshines the stars, as the Moon, the Sun or a lamp does: it is {diameter_px:.0} px wide, \
-             around ({x:.0}, {y:.0}); turn the camera away from it"
+            "a bright disk, such as the Moon, the Sun or a lamp, outshines the stars: it is \
+             {diameter_px:.0} px wide, around ({x:.0}, {y:.0}); point the camera away from it"
         ),
         Diagnosis::OutOfFocus { disc_px } => format!(
-            "the stars are out of focus: they are discs of about {disc_px:.0} px; focus by hand on a bright star"
+            "the stars are out of focus: they are disks of about {disc_px:.0} px; focus manually on a \
+             bright star"
         ),
         Diagnosis::Mosaic {
             parts: [columns, rows],
         } => format!(
-            "the frame is put together of pictures: seams divide it into {columns} × {rows} parts or more; give one \
-             of them at a time"
+            "the frame is a mosaic or collage: seams divide it into at least {columns} × {rows} pictures; \
+             use one of them at a time"
         ),
         Diagnosis::Clouds { variation } => format!(
-            "the brightness of the sky is patchy, as with clouds (it varies by {:.0} %), and few stars are seen; a \
-             clear sky is needed",
+            "the sky background is patchy, as with clouds (it varies by {:.0} %), and few stars are \
+             visible; a clear sky is needed",
             variation * 100.0
         ),
         Diagnosis::Labels { words } => format!(
-            "the picture looks like a chart or a planetarium program, with {words} words in it; give a photograph, or a view \
-             without labels and lines"
+            "the picture looks like a star chart or a planetarium view, with {words} words in it; use a \
+             photograph, or a view without labels and lines"
         ),
         Diagnosis::Black { hot_pixels } => black(*hot_pixels),
         Diagnosis::FewStars { stars } => format!(
-            "only {stars} stars were found, too few to be sure which they are; a longer exposure or a wider field of \
-             view shows more"
+            "only {stars} stars were detected, too few for a reliable identification; use a longer exposure \
+             or a wider field of view"
         ),
         plain => plain_text(plain).to_owned(),
     }
@@ -112,14 +113,14 @@ fn picture_text(cause: &Diagnosis) -> String {
 fn plain_text(cause: &Diagnosis) -> &'static str {
     match cause {
         Diagnosis::Drawing => {
-            "the picture looks like a drawing, a text or a screenshot; give a photograph of the night sky"
+            "the picture looks like a drawing, a text or a screenshot; use a photograph of the night sky"
         }
         Diagnosis::Daylight => {
-            "the sky is bright and blue, as by day; take the picture at night, when stars are seen"
+            "the sky is bright and blue, as in daylight; take the picture at night, when stars are visible"
         }
         Diagnosis::Aurora => {
-            "the green light of an aurora hides the stars; a shorter exposure, or a part of the sky without it, \
-             shows them"
+            "the green light of an aurora hides the stars; use a shorter exposure, or a part of the sky \
+             without aurora"
         }
         other => other.code(),
     }
@@ -131,8 +132,8 @@ fn star_trails(turn_rad: f64, [x, y]: [f64; 2]) -> String {
     let turn_deg = turn_rad * DEG_PER_RAD;
     let minutes = turn_deg * MINUTES_PER_DEG;
     format!(
-        "the stars are trails around ({x:.0}, {y:.0}): the sky turned by about {turn_deg:.0}°, as it does in \
-         {minutes:.0} minutes; expose for seconds, or give one picture of the series"
+        "the stars are trails around ({x:.0}, {y:.0}): the sky rotated by about {turn_deg:.0}°, as it does \
+         in {minutes:.0} minutes; expose for seconds, or use a single picture of the series"
     )
 }
 
@@ -142,20 +143,18 @@ fn black(hot_pixels: usize) -> String {
         1 => " and 1 hot pixel".to_owned(),
         _ => format!(" and {hot_pixels} hot pixels"),
     };
-    format!(
-        "the picture is black, with nothing but noise{hot} in it; uncover the lens, or expose longer"
-    )
+    format!("the picture is black, with only noise{hot}; uncover the lens, or expose longer")
 }
 
 fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> String {
     let stated = match source {
         ScaleSource::User => "that was given",
-        ScaleSource::Camera => "by the description of the camera",
-        ScaleSource::Header => "by the file's header",
+        ScaleSource::Camera => "from the camera description",
+        ScaleSource::Header => "from the file's header",
     };
     format!(
-        "the field of view {stated}, {} wide, is too narrow for the stars of this catalog, which identify \
-         fields from {} on; a catalog with fainter stars is needed",
+        "the field of view {stated}, {} wide, is too narrow for this catalog, which has enough stars for \
+         fields of {} or more; use a catalog with fainter stars",
         range(fov_x_rad),
         degrees(narrowest_rad),
     )
@@ -164,9 +163,9 @@ fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> S
 fn too_few(found: usize, needed: usize, solution: &Solution) -> String {
     let others = solution.sources.len().saturating_sub(found);
     let found = match found {
-        0 => "no star was found".to_owned(),
-        1 => "only 1 star was found".to_owned(),
-        _ => format!("only {found} stars were found"),
+        0 => "no star was detected".to_owned(),
+        1 => "only 1 star was detected".to_owned(),
+        _ => format!("only {found} stars were detected"),
     };
     let others = match others {
         0 => String::new(),
@@ -174,10 +173,10 @@ fn too_few(found: usize, needed: usize, solution: &Solution) -> String {
         _ => format!(" (and {others} detections that do not look like stars)"),
     };
     let help = match solution.background {
-        Some(_) => "; a longer exposure or a lower detection threshold shows more",
+        Some(_) => "; use a longer exposure or a lower detection threshold",
         None => "",
     };
-    format!("{found}{others} and at least {needed} are needed{help}")
+    format!("{found}{others}, but at least {needed} are needed{help}")
 }
 
 fn no_match(solution: &Solution) -> String {
@@ -191,29 +190,29 @@ fn no_match(solution: &Solution) -> String {
         all => format!("the {stars} detections of {all} that look like stars"),
     };
     format!(
-        "{tried} match no part of the sky; if this is the sky, state the field of view and the direction if you know \
-         them; the narrow field of a telescope needs a catalog with fainter stars"
+        "{tried} match no part of the sky; if the frame shows stars, give the field of view and the \
+         direction if you know them; for the narrow field of a telescope, use a catalog with fainter stars"
     )
 }
 
 fn trails_text(trails: usize, angle_rad: f64, length_px: f64) -> String {
     let angle_deg = (angle_rad * DEG_PER_RAD).round();
     let direction = match angle_deg.abs() as u32 {
-        0 => "level".to_owned(),
-        90 => "upright".to_owned(),
+        0 => "horizontal".to_owned(),
+        90 => "vertical".to_owned(),
         angle if angle_deg > 0.0 => format!("at {angle}°, rising to the right"),
         angle => format!("at {angle}°, falling to the right"),
     };
     format!(
-        "the stars are trails: {trails} of them are about {length_px:.0} px long and lie {direction}; a \
-         shorter exposure, a steadier mount or tracking is needed"
+        "the stars are trailed: {trails} trails are about {length_px:.0} px long and {direction}; use a \
+         shorter exposure, a steadier mount or tracking"
     )
 }
 
 fn excluded_text(excluded: &Excluded) -> String {
     let (ra_rad, dec_rad) = excluded.boresight.to_ra_dec();
     let mut text = format!(
-        "the stars match ({} of them) in a field {} wide around RA {:.2}°, Dec {:+.2}°",
+        "{} stars match in a field {} wide around RA {:.2}°, Dec {:+.2}°",
         excluded.stars,
         degrees(excluded.fov_x_rad),
         ra_rad * DEG_PER_RAD,
@@ -222,19 +221,19 @@ fn excluded_text(excluded: &Excluded) -> String {
     let mut conjunction = ", which";
     if let Some(allowed) = excluded.allowed_fov_x_rad {
         let allowed = range(allowed);
-        text += &format!("{conjunction} the scale that was given, {allowed} wide, excludes");
+        text += &format!("{conjunction} is outside the given range of widths, {allowed}");
         conjunction = ", and which";
     }
     if let Some((distance_rad, radius_rad)) = excluded.distance_rad {
         text += &format!(
-            "{conjunction} is {} from the direction that was given, beyond the radius of {}",
+            "{conjunction} is {} from the given direction, beyond the search radius of {}",
             degrees(distance_rad),
             degrees(radius_rad)
         );
         conjunction = ", and";
     }
     if conjunction == ", which" {
-        text += ", but only without the hints";
+        text += ", but only if the hints are ignored";
     }
     text
 }
@@ -280,7 +279,8 @@ mod tests {
         });
         assert_eq!(
             text_of(few, 3),
-            "only 1 star was found (and 2 detections that do not look like stars) and at least 4 are needed"
+            "only 1 star was detected (and 2 detections that do not look like stars), but at least 4 are \
+             needed"
         );
         let no_match = |best_log10_false_alarm| {
             Reason::Search(SearchFailure::NoMatch {
@@ -307,18 +307,18 @@ mod tests {
                 Reason::Diagnosis(Diagnosis::HintsExclude(Box::new(excluded))),
                 50
             ),
-            "the stars match (40 of them) in a field 11.4° wide around RA 10.00°, Dec -5.00°, which the scale \
-             that was given, 18.0° to 22.0° wide, excludes, and which is 23.0° from the direction that was given, \
-             beyond the radius of 5.00°"
+            "40 stars match in a field 11.4° wide around RA 10.00°, Dec -5.00°, which is outside the given \
+             range of widths, 18.0° to 22.0°, and which is 23.0° from the given direction, beyond the \
+             search radius of 5.00°"
         );
     }
 
     #[test]
     fn the_direction_of_trails_is_given_as_seen() {
         for (angle_deg, expected) in [
-            (0.3_f64, "lie level"),
-            (90.0, "lie upright"),
-            (-89.9, "lie upright"),
+            (0.3_f64, "long and horizontal"),
+            (90.0, "long and vertical"),
+            (-89.9, "long and vertical"),
             (35.0, "at 35°, rising to the right"),
             (-35.0, "at 35°, falling to the right"),
         ] {

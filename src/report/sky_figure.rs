@@ -1,9 +1,10 @@
 //! A picture of the sky at each place of a frame: brightness, extinction and limits, as SVG.
 
 use super::figure::{
-    Area, Axis, ColorScale, Marks, Panel, PanelKind, PlotLayer, Rgb, Sheet, diverging, sequential,
+    Area, Axis, ColorScale, Dot, Marks, Panel, PanelKind, PlotLayer, Rgb, Sheet, diverging,
+    sequential,
 };
-use super::frame_report::FrameReport;
+use super::frame_report::{AnnotationReport, FrameReport};
 use super::sky::{SkyCellReport, SkyReport};
 use crate::base::units::RAD_PER_DEG;
 use std::ffi::OsStr;
@@ -13,6 +14,11 @@ use std::path::Path;
 const SKY_PX: f32 = 300.0;
 /// Half of the width of a sky in degrees from the zenith, with room for the cardinal points.
 const REACH_DEG: f64 = 100.0;
+/// Cells where a quantity is not measured.
+const UNMEASURED: Rgb = Rgb([222, 222, 222]);
+/// Stars that are marked in maps of the frame, and those of them that have their names.
+const STARS: usize = 40;
+const NAMES: usize = 6;
 /// Points along the side of a cell at most 5° long.
 const SIDE_POINTS: usize = 4;
 
@@ -31,7 +37,7 @@ struct SkyPanel {
 const PANELS: [SkyPanel; 3] = [
     SkyPanel {
         title: "Brightness",
-        unit: "V magnitude of a square arcsecond",
+        unit: "V mag/arcsec²",
         value: |cell| cell.mag_arcsec2,
         is_low_light: true,
         ends: None,
@@ -39,7 +45,7 @@ const PANELS: [SkyPanel; 3] = [
     },
     SkyPanel {
         title: "Extinction by clouds",
-        unit: "magnitudes beyond clear air",
+        unit: "mag more than clear air",
         value: |cell| cell.extinction_mag,
         is_low_light: false,
         ends: Some([0.0, 2.0]),
@@ -47,7 +53,7 @@ const PANELS: [SkyPanel; 3] = [
     },
     SkyPanel {
         title: "Limit, measured − expected",
-        unit: "magnitudes; white: as expected",
+        unit: "mag; white: as expected",
         value: |cell| Some(cell.limit_vmag? - cell.expected_limit_vmag?),
         is_low_light: false,
         ends: Some([-1.0, 1.0]),
@@ -61,8 +67,17 @@ pub fn svg(report: &FrameReport) -> Option<String> {
     let panels = PANELS.iter().filter_map(|panel| panel.draw(report, sky));
     let panels: Vec<Panel> = panels.collect();
     let abreast = panels.len();
+    let has_unmeasured =
+        |panel: &SkyPanel| sky.cells.iter().any(|cell| (panel.value)(cell).is_none());
+    let note = "Gray: not measured.".to_owned();
     let sheet = Sheet {
         title: title(report, sky),
+        notes: PANELS
+            .iter()
+            .any(has_unmeasured)
+            .then_some(note)
+            .into_iter()
+            .collect(),
         frame_px: [SKY_PX; 2],
         ..Sheet::new(panels, abreast)
     };
@@ -112,37 +127,93 @@ impl SkyPanel {
             palette: self.palette,
         };
         let area = |cell: &SkyCellReport| {
-            let value = known(cell)?;
-            Some(Area {
+            let value = known(cell);
+            let told = value.map_or("not measured".to_owned(), |value| {
+                format!("{value:.2}").replace('-', "−")
+            });
+            Area {
                 points: outline(cell),
-                color: scale.color(value),
-                note: format!("{} {value:.2}", place(cell)),
-            })
+                color: value.map_or(UNMEASURED, |value| scale.color(value)),
+                note: format!("{} {told}", place(cell)),
+            }
         };
-        let areas = sky.cells.iter().filter_map(area).collect();
+        let areas = sky.cells.iter().map(area).collect();
         let mut layers = vec![PlotLayer::colored(areas, scale.clone())];
-        let (kind, [x, y]) = if sky.cells.iter().any(|cell| cell.altitude_deg.is_some()) {
+        let [x, y] = if sky.cells.iter().any(|cell| cell.altitude_deg.is_some()) {
             layers.extend(horizon());
-            (
-                PanelKind::Bare,
-                ["", ""].map(|name| Axis::new(name).within(-REACH_DEG, REACH_DEG)),
-            )
+            [[-REACH_DEG, REACH_DEG]; 2]
         } else {
-            let [width, height] = [report.width, report.height].map(|side| side as f64 - 0.5);
-            let axes = [
-                Axis::new("x (px)").within(-0.5, width),
-                Axis::new("y (px)").within(height, -0.5),
-            ];
-            (PanelKind::Map, axes)
+            layers.extend(frame(report));
+            let [width, height] = [report.width, report.height].map(|side| side as f64);
+            // The compass is beside the frame.
+            [
+                [-0.5, width + 2.5 * compass_px(report)],
+                [height - 0.5, -0.5],
+            ]
         };
         Some(Panel {
             title: self.title.to_owned(),
-            x,
-            y,
+            x: Axis::new("").within(x[0], x[1]),
+            y: Axis::new("").within(y[0], y[1]),
             layers,
-            kind,
+            kind: PanelKind::Bare,
         })
     }
+}
+
+/// The outline of the frame, its brightest stars, and where north and east are.
+fn frame(report: &FrameReport) -> Vec<PlotLayer> {
+    let [right, below] = [report.width, report.height].map(|side| side as f64 - 0.5);
+    let corners = [(-0.5, -0.5), (right, -0.5), (right, below), (-0.5, below)];
+    let outline = corners.into_iter().chain([corners[0]]).collect();
+    let stars = || report.annotations.iter().filter(|it| it.kind == "star");
+    let dot = |star: &AnnotationReport| Dot {
+        note: star.label.clone(),
+        ..Dot::from((star.x, star.y))
+    };
+    let name_off = 0.035 * report.height as f64;
+    let name = |star: &AnnotationReport| (star.x, star.y - name_off, star.label.clone());
+    let mut layers = vec![
+        PlotLayer::guide(Marks::Line(outline)),
+        PlotLayer::unnamed(
+            Rgb::ORANGE,
+            Marks::Dots(stars().take(STARS).map(dot).collect()),
+        ),
+        PlotLayer::unnamed(
+            Rgb::BLACK,
+            Marks::Texts(stars().take(NAMES).map(name).collect()),
+        ),
+    ];
+    layers.extend(compass(report).into_iter().flatten());
+    layers
+}
+
+fn compass_px(report: &FrameReport) -> f64 {
+    0.06 * report.width as f64
+}
+
+/// Arrows to north and east beside the frame; `None` where the directions differ over the frame, as with a
+/// whole sky.
+fn compass(report: &FrameReport) -> Option<[PlotLayer; 2]> {
+    let attitude = report.attitude.as_ref().filter(|of| of.at != "axis")?;
+    let is_mirrored = report.optics.as_ref().is_some_and(|of| of.mirrored);
+    let long = compass_px(report);
+    let center = (report.width as f64 + 1.3 * long, 1.5 * long);
+    // Position angles grow to the left of up, as seen from within the sky.
+    let toward = |position_angle_deg: f64, length: f64| {
+        let from_up = (attitude.up_pa_deg - position_angle_deg) * RAD_PER_DEG;
+        let (sin, cos) = libm::sincos(if is_mirrored { -from_up } else { from_up });
+        (center.0 + length * sin, center.1 - length * cos)
+    };
+    let arrows = [0.0, 90.0].map(|angle_deg| vec![center, toward(angle_deg, 0.7 * long)]);
+    let names = [("N", 0.0), ("E", 90.0)].map(|(name, angle_deg)| {
+        let (x, y) = toward(angle_deg, long);
+        (x, y, name.to_owned())
+    });
+    Some([
+        PlotLayer::unnamed(Rgb::BLACK, Marks::Lines(arrows.into())),
+        PlotLayer::unnamed(Rgb::BLACK, Marks::Texts(names.into())),
+    ])
 }
 
 /// Circles of altitude and the cardinal points: as one looks up, with east on the left.

@@ -30,7 +30,7 @@ impl SkyReport {
         if let Some(range) = self.range(|cell| cell.mag_arcsec2) {
             let cells = counted(self.cells.len(), "cell");
             let [bright, dark] = range;
-            let text = format!("{bright:.2} to {dark:.2} mag/arcsec² (V) in {cells}");
+            let text = format!("{bright:.2} to {dark:.2} mag/arcsec² (V) over {cells}");
             lines.push(labelled("sky", &text));
         }
         if let (Some("unlit"), Some(level), Some(sigma)) = (
@@ -49,7 +49,8 @@ impl SkyReport {
         }
         if let Some(tone) = &self.tone_curve {
             let text = format!(
-                "the level of the sky grows as the power {:.2} ± {:.2} of its light, measured with stars; the errors include this",
+                "sky level proportional to (light)^γ with γ = {:.2} ± {:.2}, measured with stars; included \
+                 in the errors",
                 tone.exponent, tone.exponent_sigma
             );
             lines.push(labelled("tone curve", &text));
@@ -63,7 +64,7 @@ impl SkyReport {
             let source = if self.extinction_measured {
                 counted(self.stars, "star")
             } else {
-                "mostly the assumed typical value; the stars constrain it little".to_owned()
+                "mostly the assumed typical value, because the stars constrain it little".to_owned()
             };
             let text = format!("{mag:.3} ± {sigma:.3} mag per airmass ({source})");
             lines.push(labelled("extinction", &text));

@@ -25,14 +25,14 @@ impl TableRow for StarRow {
         columns! {
             Self:
             frame, "", "meta.id", "name of the frame";
-            star.x, "pix", "pos.cartesian.x;instr.det", "centroid along the rows, from 0";
-            star.y, "pix", "pos.cartesian.y;instr.det", "centroid along the columns, from 0";
+            star.x, "pix", "pos.cartesian.x;instr.det", "x of the centroid, from 0";
+            star.y, "pix", "pos.cartesian.y;instr.det", "y of the centroid, from 0";
             star.sigma_x, "pix", "stat.error;pos.cartesian.x", "standard error of x as the position of the named star";
             star.sigma_y, "pix", "stat.error;pos.cartesian.y", "standard error of y as the position of the named star";
             star.flux, "", "phot.flux", "flux above the background, in the units of the frame";
             star.sigma_flux, "", "stat.error;phot.flux", "standard error of flux";
             star.peak, "", "phot.flux;stat.max", "brightest pixel above the background, in the units of the frame";
-            star.snr, "", "stat.snr", "flux over its standard error";
+            star.snr, "", "stat.snr", "signal-to-noise ratio: flux over its standard error";
             star.id, "", "meta.id;meta.main", "identifier in the catalog";
             star.name, "", "meta.id", "proper name and designation";
             star.hip, "", "meta.id", "number in the Hipparcos Catalogue";

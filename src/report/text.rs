@@ -90,7 +90,8 @@ impl FrameReport {
     /// How close the best arrangement came, where none was good enough.
     fn best_line(&self) -> Option<String> {
         let best = self.best_log10_false_alarm?;
-        let text = format!("log10 false-alarm probability {best:.1}, -8 or less is needed");
+        let text =
+            format!("log10 of the false-alarm probability is {best:.1}; -8 or less is needed");
         Some(labelled("best match", &text))
     }
 
@@ -114,17 +115,18 @@ impl FrameReport {
                 let zone = if is_assumed { "" } else { " UTC" };
                 let utc = date.iso.replace('T', " ").replace('Z', zone);
                 let offset = offset_text(date);
-                format!("{utc}, {source}{offset}: positions of that date")
+                format!("{utc}, {source}{offset}")
             }
             None => {
                 let see = names.see(&[Remedy::Date]);
                 let error = match self.status {
                     Status::Identified => {
-                        ", aberration is not corrected, and the error of the focal length allows for it"
+                        ", and aberration is not corrected; the stated error of the focal length allows for \
+                         this"
                     }
                     Status::NotIdentified => "",
                 };
-                format!("unknown: positions of J2000.0{error}{see}")
+                format!("unknown: star positions of J2000.0 are used{error}{see}")
             }
         };
         labelled("date", &text)
@@ -237,7 +239,7 @@ fn attitude_lines(attitude: &AttitudeReport) -> Vec<String> {
                 attitude.dec_deg,
                 match attitude.frame_of {
                     AttitudeFrame::Icrs => "ICRS",
-                    AttitudeFrame::Apparent => "apparent, axes of ICRS",
+                    AttitudeFrame::Apparent => "apparent place, ICRS axes",
                 }
             ),
         ),
@@ -267,7 +269,7 @@ fn optics_lines(optics: &OpticsReport) -> Vec<String> {
     };
     let field = match (optics.fov_x_deg.zip(optics.fov_y_deg), optics.valid_to_deg) {
         (Some((x, y)), _) => format!("{x:.3}° × {y:.3}°"),
-        (None, to_deg) => format!("{:.1}° around the axis", to_deg.unwrap_or(f64::NAN)),
+        (None, to_deg) => format!("within {:.1}° of the axis", to_deg.unwrap_or(f64::NAN)),
     };
     let mut lines = vec![labelled(
         "field",

@@ -56,9 +56,9 @@ impl NoBrightness {
     pub const fn text(self) -> &'static str {
         match self {
             Self::BiasUnknown => {
-                "the dark level is unknown; a dark frame or the camera's description gives it"
+                "the dark level is unknown; give a dark frame or a camera description"
             }
-            Self::NotLinear => "the response is not linear, as in most JPEG files",
+            Self::NotLinear => "the detector response is not linear, as in most JPEG files",
         }
     }
 }

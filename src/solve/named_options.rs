@@ -150,7 +150,7 @@ fn star_count(text: &str) -> Result<usize, String> {
     let stars = Number(text).within(&(4.0..));
     let whole = stars.filter(|stars| stars.fract() == 0.0);
     whole.map_or_else(
-        || must_be("a whole number from 4 on", text),
+        || must_be("a whole number of at least 4", text),
         |stars| Ok(stars as usize),
     )
 }
@@ -161,7 +161,7 @@ fn switch(text: &str) -> Result<bool, String> {
 
 fn parsed<T: FromStr<Err: Display>>(text: &str) -> Result<T, String> {
     text.parse()
-        .map_err(|error: T::Err| format!("is wrong: {error}"))
+        .map_err(|error: T::Err| format!("is invalid: {error}"))
 }
 
 /// Puts the value that is stored as this word, one of `words`.

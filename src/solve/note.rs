@@ -201,22 +201,22 @@ impl Note {
                 "the list has no flux and no magnitude; its rows are assumed to be sorted by brightness"
             }
             Self::NoDate => {
-                "the date is unknown: star positions are those of 2000, aberration is not corrected, and the \
-                 stated error of the focal length allows for it"
+                "the date is unknown: star positions are those of J2000.0, and aberration is not corrected; \
+                 the stated error of the focal length allows for this"
             }
             Self::NoTimeOfDay => {
                 "the time of day is unknown, so zenith distance and refraction are not computed"
             }
             Self::ZoneAssumed => {
-                "the time zone of the file's time is unknown, and UTC was assumed: altitude and azimuth are \
-                 correct only if that is right (utc_offset)"
+                "the time zone of the file's time is unknown and assumed to be UTC: if it is not, altitude \
+                 and azimuth are wrong (utc_offset)"
             }
             Self::AttitudeOnly => {
                 "attitude and optics are from the brightest stars; the other stars were not identified, and no \
                  magnitude was measured"
             }
             Self::PointingAtOnce => {
-                "the brightest stars were enough to find the pointing; the others were not measured"
+                "the brightest stars were enough to determine the pointing; the other stars were not measured"
             }
             Self::SkyNotMeasured => {
                 "the sky was not measured: too few stars are bright enough to measure its transparency"
@@ -435,7 +435,8 @@ impl fmt::Display for Note {
             Self::LargestImage(choice) => choice.fmt(f),
             Self::Orientation(orientation) => write!(
                 f,
-                "the file's rows are displayed {orientation} (Orientation {}); x and y refer to the displayed picture",
+                "the image is displayed {orientation}, as its header says (Orientation {}); x and y refer \
+                 to the displayed picture",
                 orientation.tag()
             ),
             Self::Assumed(assumption) => assumption.fmt(f),
@@ -449,7 +450,8 @@ impl fmt::Display for Note {
             Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
-                "site, date and attitude contradict each other: the frame's center would be {:.1}° below the horizon",
+                "site, date and attitude contradict each other: the center of the frame would be {:.1}° \
+                 below the horizon",
                 depth_rad * DEG_PER_RAD
             ),
             Self::SiteOrTime(wrong) => wrong.fmt(f),
@@ -465,8 +467,8 @@ impl fmt::Display for Note {
             Self::RoundPicture(circle) => write_circle(f, circle),
             Self::NotLinear { slope, mean_v_mag } => write!(
                 f,
-                "the response is not linear: a difference of 1 mag in the catalog is {:.2} ± {:.2} mag in this frame, and \
-                 the zero point is accurate only near V {mean_v_mag:.1}",
+                "the detector response is not linear: 1 mag in the catalog is {:.2} ± {:.2} mag in this \
+                 frame, and the zero point is accurate only near V {mean_v_mag:.1}",
                 slope.value, slope.sigma
             ),
             Self::Vignetting(loss) => write!(
@@ -508,7 +510,8 @@ fn write_guessed_size(
 ) -> fmt::Result {
     write!(
         f,
-        "the size of the frame is not stated; {width} × {height} pixels were assumed, the extent of the centroids"
+        "the size of the frame was not given; {width} × {height} pixels, the extent of the centroids, were \
+         assumed"
     )?;
     let Some([x, y]) = centre_sigma_px else {
         return Ok(());
@@ -531,25 +534,26 @@ fn write_header_scale(f: &mut fmt::Formatter<'_>, pixel_scale_rad: [f64; 2]) -> 
 fn write_double(f: &mut fmt::Formatter<'_>, double: &DoubleImage) -> fmt::Result {
     write!(
         f,
-        "every star appears twice: {double}; fluxes, zero point and limit are those of one of the two images; \
-         positions and attitude may be wrong by up to that offset, and the stated error of the attitude \
-         includes half of it"
+        "every star appears twice: {double}; fluxes, zero point and limit are those of one of the two \
+         images; positions and attitude may be off by up to this offset, and the stated error of the \
+         attitude includes half of it"
     )
 }
 
 fn write_residuals(f: &mut fmt::Formatter<'_>, rms_px: f64, excess_sigma_px: f64) -> fmt::Result {
     write!(
         f,
-        "the residuals of {rms_px:.1} px rms are larger than the centroid errors: the lens or the spots differ from \
-         the model; the stated errors include {excess_sigma_px:.1} px per star on each axis for this"
+        "the residuals of {rms_px:.1} px rms are larger than the centroid errors: the lens or the \
+         point-spread function differs from the model; the stated errors include {excess_sigma_px:.1} px \
+         per star on each axis for this"
     )
 }
 
 fn write_other_lens(f: &mut fmt::Formatter<'_>, known_px: f64, found_px: f64) -> fmt::Result {
     write!(
         f,
-        "the lens in the camera's description does not fit the stars: it was changed, refocused or moved; its \
-         focal length is {known_px:.2} px, that of this frame {found_px:.2} px"
+        "the lens in the camera description does not fit the stars (changed, refocused or moved?): its \
+         focal length is {known_px:.2} px, but that of this frame is {found_px:.2} px"
     )
 }
 
@@ -567,7 +571,8 @@ fn write_other_size(f: &mut fmt::Formatter<'_>, known: [f64; 2], found: [f64; 2]
     let [x, y] = [known[0] / found[0], known[1] / found[1]];
     write!(
         f,
-        "the lens in the camera's description is not used, because it was measured in frames of {} x {} px: this frame is {}",
+        "the lens in the camera description is not used, because it was measured in frames of {} x {} px, \
+         and this frame is {}",
         known[0],
         known[1],
         if x == y && x.fract() == 0.0 {
@@ -584,7 +589,8 @@ fn write_columns(f: &mut fmt::Formatter<'_>, columns: &[usize]) -> fmt::Result {
     let list = listed(columns.iter().map(usize::to_string));
     write!(
         f,
-        "these columns have a constant value, completely or in part, and are ignored there: x = {list}"
+        "defective columns, which have a constant value in all or some of their rows, are ignored there: x \
+         = {list}"
     )
 }
 
@@ -592,7 +598,8 @@ fn write_wings(f: &mut fmt::Formatter<'_>, wings: &Wings) -> fmt::Result {
     let (percent, sigma_percent) = (100.0 * wings.share, 100.0 * wings.sigma);
     write!(
         f,
-        "the stars have wings: light outside the fitted spots, {percent:.1} ± {sigma_percent:.1} % of that in them, is added to the fluxes"
+        "the point-spread function has wings outside the fitted spots: fluxes are increased by {percent:.1} \
+         ± {sigma_percent:.1} % for their light"
     )
 }
 
@@ -612,8 +619,8 @@ fn write_lines(f: &mut fmt::Formatter<'_>, trails: &[Trail]) -> fmt::Result {
 fn write_trails(f: &mut fmt::Formatter<'_>, trails: &StarTrails) -> fmt::Result {
     write!(
         f,
-        "the stars are trailed by {:.0} px at {:.0}° from the image's x axis: each position is the middle of a trail, \
-         so attitude and optics are those at mid-exposure",
+        "the stars are trailed by {:.0} px at {:.0}° from the image's x axis: each position is the middle \
+         of a trail, so attitude and optics are for mid-exposure",
         trails.length_px,
         trails.angle_rad * DEG_PER_RAD
     )
@@ -652,11 +659,13 @@ fn write_body(f: &mut fmt::Formatter<'_>, seen: &BodyInFrame) -> fmt::Result {
         position.y
     )?;
     match (seen.source, seen.uncertainty_px < 1.0) {
-        (Some(_), _) => f.write_str(", and the detection there is this body, not a star"),
-        (None, true) => f.write_str(", but no detection there can be identified with it"),
+        (Some(_), _) => f.write_str(", and the detection at this position is identified with it"),
+        (None, true) => {
+            f.write_str(", but no detection at this position can be identified with it")
+        }
         (None, false) => write!(
             f,
-            " within {:.0} px, because time or site are uncertain; no detection can be identified with it",
+            " within {:.0} px, because time or site is uncertain; no detection can be identified with it",
             seen.uncertainty_px
         ),
     }
@@ -666,7 +675,9 @@ fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
     let [least_px, largest_px] = psf.sigma_range_px;
     write!(
         f,
-        "the spots are not round Gaussians of one size (standard deviation {least_px:.2} to {largest_px:.2} px, axis ratio up to {:.1}): the stars are fitted with the point-spread function measured in the frame",
+        "the stars are not round Gaussians of one size (standard deviation {least_px:.2} to {largest_px:.2} \
+         px, axis ratio up to {:.1}): the stars are fitted with the point-spread function measured in the \
+         frame",
         psf.axis_ratio
     )?;
     if psf.is_comatic {
@@ -678,12 +689,12 @@ fn write_spots(f: &mut fmt::Formatter<'_>, psf: &MeasuredPsf) -> fmt::Result {
 fn write_noise_tail(f: &mut fmt::Formatter<'_>, tail: NoiseTail) -> fmt::Result {
     let cause = match tail {
         NoiseTail::Correlated => "is correlated between pixels",
-        NoiseTail::Coarse => "is smaller than the steps of the gray levels, with rare large values",
-        NoiseTail::CutOff => "is cut off at the frame's lowest value",
+        NoiseTail::Coarse => "is smaller than one gray level, with rare large values",
+        NoiseTail::CutOff => "is clipped at the lowest value of the frame",
     };
     write!(
         f,
-        "the noise {cause}: the rate of false detections may be ten times the stated one"
+        "the noise {cause}: the rate of false detections may be ten times higher than stated"
     )
 }
 

@@ -11,7 +11,7 @@ pub enum StoreError {
     #[error("there are no frames")]
     NoFrames,
     /// The directory belongs to another run.
-    #[error("{} holds another run: {differences}", .directory.display())]
+    #[error("{} has the results of a run with other settings: {differences}", .directory.display())]
     OtherRun {
         /// The directory.
         directory: PathBuf,
@@ -19,7 +19,7 @@ pub enum StoreError {
         differences: String,
     },
     /// The directory has results of an unknown run.
-    #[error("{} has {name} but no {file}: the run that it belongs to is unknown", .directory.display())]
+    #[error("{} has {name} but no {file}: it is unknown which run {name} belongs to", .directory.display())]
     UnknownRun {
         /// The directory.
         directory: PathBuf,
@@ -29,13 +29,13 @@ pub enum StoreError {
         file: &'static str,
     },
     /// A file that says whose the directory is was changed since it was written.
-    #[error("{} is damaged; repeat the command that wrote the directory: it restores the file if the results are its own", .0.display())]
+    #[error("{} is damaged; repeat the command that wrote the directory: it restores the file if the results match", .0.display())]
     Damaged(PathBuf),
     /// Another process writes the results.
     #[error("another run is writing {}", .0.display())]
     Locked(PathBuf),
     /// A table has other content than this run would write.
-    #[error("{}, line {line}: {problem}; the table was changed: remove the directory to start again", .path.display())]
+    #[error("{}, line {line}: {problem}; the table was modified: remove the directory to start again", .path.display())]
     Changed {
         /// The table.
         path: PathBuf,
@@ -58,7 +58,7 @@ pub enum StoreError {
         parts: usize,
     },
     /// A list of frames has no column of names.
-    #[error("{} has no column \"frame\", nor one column of text only", .0.display())]
+    #[error("{} has neither a column \"frame\" nor a single text column", .0.display())]
     NoNames(PathBuf),
     /// A file could not be read or written.
     #[error("{action} {}", .path.display())]

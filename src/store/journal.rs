@@ -185,7 +185,7 @@ impl<Row> Lines<'_, Row> {
     fn left_out(&self, path: &Path) -> Vec<String> {
         let parts = [
             (&self.damaged, "damaged; their frames are processed again"),
-            (&self.surplus, "of other frames, or repeated, ignored"),
+            (&self.surplus, "for other frames or repeated, ignored"),
         ];
         let parts = parts.into_iter().filter(|(lines, _)| !lines.is_empty());
         let text = |(lines, what): (&Vec<usize>, _)| {

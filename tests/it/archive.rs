@@ -36,7 +36,7 @@ fn tables_do_not_depend_on_workers_or_threads_and_a_rerun_skips_what_is_there() 
     let night = night.path();
     let whole = process(night, "whole", &[]);
     assert_eq!(whole.status, 1, "{}", whole.stderr);
-    let told = "3 parts, 5 frames: 4 identified, 0 not identified, 1 unread\n";
+    let told = "3 parts, 5 frames: 4 identified, 0 not identified, 1 unreadable\n";
     assert_eq!(whole.stdout, told);
     assert!(whole.stderr.contains("broken.tif"), "{}", whole.stderr);
 
@@ -77,14 +77,11 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     process(night, "out", &[]);
     let before = files(&night.join("out"));
     for (options, difference) in [
-        (&["--sigma", "6"][..], "sigma is null there, but 6.0 here"),
-        (
-            &["--max-stars", "20"],
-            "max_stars is 20000 there, but 20 here",
-        ),
+        (&["--sigma", "6"][..], "sigma was null, now 6.0"),
+        (&["--max-stars", "20"], "max_stars was 20000, now 20"),
         (
             &["--dark", "frames/2020-03-01T200000.tif"],
-            "dark is null there, but \"",
+            "dark was null, now \"",
         ),
     ] {
         let refused = process(night, "out", options);
@@ -95,7 +92,7 @@ fn a_directory_is_of_one_configuration_and_of_one_list_of_frames() {
     let refused = process(night, "out", &[]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("frames is 3 there, but 2 here"),
+        refused.stderr.contains("frames was 3, now 2"),
         "{}",
         refused.stderr
     );
@@ -274,7 +271,7 @@ fn each_image_of_a_mosaic_is_a_row() {
     let arguments = ["process", "cube.fits.fz", "--out-parquet", "out"];
     let ran = run(directory, &[&arguments[..], &["--page", "all"]].concat());
     assert_eq!(ran.status, 3, "{}", ran.stderr);
-    let told = "1 part, 4 frames: 0 identified, 4 not identified, 0 unread\n";
+    let told = "1 part, 4 frames: 0 identified, 4 not identified, 0 unreadable\n";
     assert_eq!(ran.stdout, told);
     run(directory, &["archive", "merge", "out", "--out", "tables"]);
     let names = starpipe::store::names_in(&directory.join("tables/frames.parquet")).unwrap();
@@ -346,12 +343,12 @@ fn status_lists_the_first_of_many_frames_that_could_not_be_read() {
         [
             "parts      12 of 23",
             "files      12 of 23",
-            "frames     12: 0 identified, 0 not identified, 12 unread",
+            "frames     12: 0 identified, 0 not identified, 12 unreadable",
             "missing    parts 1 3 5 7 9 11 13 15 17 19 21",
         ]
     );
     assert_eq!(lines.len(), 4 + 10 + 1);
-    assert_eq!(lines[14], "unread     2 more, which --format csv lists");
+    assert_eq!(lines[14], "unreadable 2 more, listed by --format csv");
     run(directory, &[&list[..], &["--shard", "1/1"]].concat());
     fs::remove_dir_all(directory.join("out/frames.parquet")).unwrap();
     let status = run(directory, &["archive", "status", "out"]).stdout;

@@ -715,7 +715,7 @@ fn bad_records_are_reported_below_one_percent_and_refused_above() {
     );
     assert!(
         ran.stderr
-            .contains("not all of its 300 records are stars: 1 without a magnitude"),
+            .contains("some of its 300 records are skipped: 1 without a magnitude"),
         "{}",
         ran.stderr
     );
@@ -750,7 +750,10 @@ fn swapped_columns_and_hours_for_degrees_are_detected() {
 
     for headings in ["id,ra,dec,mag", "id,ra_deg,dec_deg,mag"] {
         let message = folder.refused(random_table(headings, 300, 15.0).join("\n"));
-        assert!(message.contains("name the column ra_hours"), "{message}");
+        assert!(
+            message.contains("rename the column to ra_hours"),
+            "{message}"
+        );
     }
     // Sexagesimal values are unambiguous: a strip of the sky, 24 degrees wide.
     let mut strip = random_table("id,ra,dec,mag", 300, 15.0);
@@ -773,7 +776,7 @@ fn swapped_columns_and_hours_for_degrees_are_detected() {
 fn files_that_are_not_catalogues_are_refused_with_what_is_missing() {
     let folder = Folder::new();
     for (content, part) in [
-        ("", "it is empty"),
+        ("", "the file is empty"),
         (
             "id,ra,dec,mag\n",
             "no star with a position and a magnitude among 0 records",
@@ -830,16 +833,16 @@ fn a_directory_holds_one_catalogue_or_is_refused() {
             ran.stderr
         );
     };
-    refusal("no catalog is in it");
+    refusal("found no catalog in it");
     fs::write(inside.join("notes.txt"), "no, table").unwrap();
-    refusal("no catalog is in it");
+    refusal("found no catalog in it");
     fs::write(inside.join("a.csv"), "id,ra,dec,mag\n1,2,3,4\n").unwrap();
     assert_eq!(folder.import(&inside).status, 0);
     fs::write(inside.join("b.csv"), "id,ra,dec,mag\n2,3,3,4\n").unwrap();
-    refusal("more than one catalog is in it (a.csv, b.csv");
+    refusal("found more than one catalog in it (a.csv, b.csv");
     fs::remove_file(inside.join("b.csv")).unwrap();
     fs::write(inside.join("tyc2.dat.00"), TYCHO2_MAIN).unwrap();
-    refusal("more than one catalog is in it (tyc2.dat.00, a.csv");
+    refusal("found more than one catalog in it (tyc2.dat.00, a.csv");
 }
 
 proptest! {

@@ -311,8 +311,9 @@ fn exposures_can_be_given_and_csv_rows_are_frames() {
     let done = ran(&["darks", "--exposure", "5:elsewhere", text(&short)]);
     assert_eq!(done.status, 2);
     assert!(
-        done.stderr
-            .contains("--exposure names elsewhere, but no frame of it is given"),
+        done.stderr.contains(
+            "--exposure gives the exposure of elsewhere, but no frame in it is processed"
+        ),
         "{}",
         done.stderr
     );
@@ -497,7 +498,7 @@ fn calibrated_frames_have_their_stars_and_no_hot_pixels() {
     let noted = night.process(&["--dark", &dark, "--exposure", "5"]);
     let note = noted.reports()[0]["notes"].to_string();
     assert!(
-        note.contains("was exposed for 1 s and the frame for 5 s"),
+        note.contains("was exposed for 1 s, but the frame for 5 s"),
         "{note}"
     );
 

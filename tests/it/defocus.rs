@@ -249,9 +249,9 @@ fn nonsensical_options_are_refused_before_any_work() {
         (&["--count", "0"], "0 is not in 1..="),
         (
             &["--radius-px", "1:1:1"],
-            "a sweep of 1 values, expected 2 to 1000",
+            "the sweep has 1 values, expected 2 to 1000",
         ),
-        (&["--radius-px", "1:1:5"], "expected a rising one"),
+        (&["--radius-px", "1:1:5"], "expected increasing values"),
         (&["--radius-px", "0.01:1:5"], "expected 0.1 to 5 px"),
         (&["--radius-px", "1:2"], "is not of the form FROM:TO:COUNT"),
         (
@@ -301,7 +301,7 @@ fn nonsensical_options_are_refused_before_any_work() {
             1,
             "is 0 e, expected more",
         ),
-        (&["--vmag", "25"], 1, "half of the stars are found at V"),
+        (&["--vmag", "25"], 1, "half of the stars of V"),
         (&["--camera", "none.toml"], 2, "cannot be used with"),
     ] {
         let ran = defocus(&[&camera[..], &SMALL_ENERGY[4..], arguments].concat());

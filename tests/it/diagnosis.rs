@@ -129,7 +129,7 @@ fn a_field_too_narrow_for_the_catalog_says_so() {
     }
     let picture = canvas.develop(3);
     for options in [["--fov", "0.5"], ["--pixel-scale", "2"]] {
-        let expected = ["that was given", "from 1.50° on"];
+        let expected = ["that was given", "fields of 1.50° or more"];
         check(&picture, &options, "too_narrow", &expected);
     }
     for fov in ["20", "130"] {
@@ -141,17 +141,17 @@ fn a_field_too_narrow_for_the_catalog_says_so() {
 fn a_wrong_hint_is_reported_with_the_solution_without_it() {
     let picture = ORION.picture(&bright_stars());
     let around = "24.0° wide around RA 83.0";
-    let scale = ["24.0° wide", "36.0° to 44.0° wide, excludes"];
+    let scale = ["24.0° wide", "range of widths, 36.0° to 44.0°"];
     check(&picture, &["--fov", "40"], "hints_exclude", &scale);
     let elsewhere = ["--near", "103,0", "--radius", "5"];
-    let place = [around, "20.0° from the direction", "radius of 5.00°"];
+    let place = [around, "20.0° from the given direction", "radius of 5.00°"];
     check(&picture, &elsewhere, "hints_exclude", &place);
     let both = ["--fov", "40", "--near", "103,0", "--radius", "5"];
     check(
         &picture,
         &both,
         "hints_exclude",
-        &["excludes, and which is 20.0° from the direction"],
+        &["36.0° to 44.0°, and which is 20.0° from the given direction"],
     );
 }
 
@@ -161,7 +161,7 @@ fn trails_are_reported_with_direction_and_length() {
     for (angle_deg, direction) in [
         (35.0_f64, "35°, rising"),
         (-60.0, "60°, falling"),
-        (90.0, "upright"),
+        (90.0, "vertical"),
     ] {
         let mut canvas = Canvas::new(WIDTH, HEIGHT);
         let (sin, cos) = angle_deg.to_radians().sin_cos();

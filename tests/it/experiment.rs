@@ -64,12 +64,12 @@ fn a_page_and_a_picture() {
         let ran = experiment(&["1", "--count", "2", "--out", out]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         assert!(
-            ran.stdout.contains("they contradict each other"),
+            ran.stdout.contains("these contradict each other"),
             "{}",
             ran.stdout
         );
         assert!(
-            ran.stdout.contains("7 of 7 are the paper's"),
+            ran.stdout.contains("7 of 7 as in the paper"),
             "{}",
             ran.stdout
         );

@@ -160,7 +160,7 @@ fn other_commands_pass_over_the_same_of_a_folder() {
     let parquet = format!("--out-parquet={}", out.path().join("archive").display());
     let archive = run(folder, &["process", &parquet, "--camera", CAMERA]);
     let told = format!(
-        "1 part, 8 frames: {} identified, 1 not identified, 1 unread\n",
+        "1 part, 8 frames: {} identified, 1 not identified, 1 unreadable\n",
         FRAMES + 1
     );
     assert_eq!(archive.stdout, told, "{}", archive.stderr);

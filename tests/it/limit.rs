@@ -588,7 +588,7 @@ fn equivalent_options_exclude_each_other() {
 fn nonsensical_sweeps_are_refused_before_anything_is_printed() {
     for (sweep, expected) in [
         ("aperture_mm=200:5:10", "the sweep runs from 200 to 5"),
-        ("aperture_mm=5:200:1", "a sweep of 1 values"),
+        ("aperture_mm=5:200:1", "the sweep has 1 values"),
         ("aperture_mm=5:200:1001", "expected 2 to 1000"),
         (
             "aperture_mm=5:200:99999999999999999999",
@@ -607,7 +607,10 @@ fn nonsensical_sweeps_are_refused_before_anything_is_printed() {
             "zenith_distance_deg=0:89.9999:3",
             "zenith_distance_deg of 89.9999: there is no",
         ),
-        ("dark_current_e_s=0:10:3:log", "logarithmic steps from 0"),
+        (
+            "dark_current_e_s=0:10:3:log",
+            "the logarithmic sweep starts at 0",
+        ),
         (
             "band_to_nm=700:900:3",
             "does not cover the band from 360 to 800 nm",
@@ -725,7 +728,7 @@ fn the_papers_reading_needs_a_curve_over_the_papers_band() {
     let paper = limit(&[&options[..], &["--reading", "paper"]].concat());
     assert_eq!(paper.status, 1);
     assert!(
-        paper.stderr.contains("of the paper's reading"),
+        paper.stderr.contains("of the paper's equations"),
         "{}",
         paper.stderr
     );

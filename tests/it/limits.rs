@@ -238,7 +238,8 @@ fn a_crowded_picture_takes_no_more_memory_than_it_may() {
     };
     let ran = with_memory("20");
     assert_eq!(ran.status, 1);
-    let expected = "pixels are above the detection threshold, which needs too much memory";
+    let expected =
+        "pixels are above the detection threshold, and measuring them needs too much memory";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     let ran = with_memory("200");
     assert_eq!(ran.status, 3, "{}", ran.stderr);
@@ -345,7 +346,7 @@ fn a_frame_that_is_not_read_in_time_is_told_of() {
     let ran = process(&[&limited[..], &[&path, &orion()]].concat());
     assert_eq!(ran.status, 1);
     let expected =
-        "slow.pgm.gz: not done within the time limit of a frame: interrupted; see --time-limit";
+        "slow.pgm.gz: not finished within the time limit per frame: interrupted; see --time-limit";
     assert!(ran.stderr.contains(expected), "{}", ran.stderr);
     assert!(ran.stdout.contains("orion.png"), "{}", ran.stdout);
 }

@@ -95,7 +95,11 @@ fn the_size_is_that_of_the_frames_in_which_the_lens_was_measured() {
     let both = both.to_str().unwrap();
     let ran = identify(&list, &["--camera", both]);
     assert_eq!((ran.status, ran.stdout.as_str()), (2, ""));
-    assert!(ran.stderr.contains("must be stated"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("give the width and height"),
+        "{}",
+        ran.stderr
+    );
     let ran = identify(&list, &["--camera", both, "--width", "512"]);
     assert_eq!(ran.reports()[0]["height"], 384, "{}", ran.stderr);
 }

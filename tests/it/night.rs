@@ -227,7 +227,9 @@ fn a_night_tells_clouds_and_the_knock_and_goes_on_where_it_stopped() {
     let refused = night(&out, &["--exposure=10"]);
     assert_eq!(refused.status, 2);
     assert!(
-        refused.stderr.contains("holds another run"),
+        refused
+            .stderr
+            .contains("has the results of a run with other settings"),
         "{}",
         refused.stderr
     );

@@ -476,7 +476,7 @@ fn a_bug_that_one_frame_meets_ends_that_frame_alone() {
 
     let part = run("process a.png b.tif c.png --out-parquet archive");
     assert_eq!(part.status, 1);
-    let told = "1 part, 3 frames: 2 identified, 0 not identified, 1 unread\n";
+    let told = "1 part, 3 frames: 2 identified, 0 not identified, 1 unreadable\n";
     assert_eq!(part.stdout, told);
     let status = run("archive status archive");
     assert!(status.stdout.contains(bug), "{}", status.stdout);

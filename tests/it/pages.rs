@@ -95,10 +95,12 @@ fn a_limit_has_its_budget_and_a_sweep_its_values() {
     page.has(&format!("V {:.2}", number(prediction, "/limit_vmag")));
     page.has("starpipe limit --preset experiment-1 --format=json --html");
     assert_eq!(page.figures(), 2);
-    let budget = page.table("Budget of the limit")["rows"].as_u64().unwrap() as usize;
-    let noise =
-        (0..budget).find(|&row| page.cell("Budget of the limit", "quantity", row) == "total noise");
-    let noise = page.cell("Budget of the limit", "value", noise.unwrap());
+    let budget = page.table("Signal and noise budget")["rows"]
+        .as_u64()
+        .unwrap() as usize;
+    let noise = (0..budget)
+        .find(|&row| page.cell("Signal and noise budget", "quantity", row) == "total noise");
+    let noise = page.cell("Signal and noise budget", "value", noise.unwrap());
     assert_eq!(noise.as_f64().unwrap(), number(prediction, "/noise_e"));
 
     let sweep = ["--sweep=exposure_s=0.1:1:4", "--html=sweep.html"];
@@ -158,7 +160,11 @@ fn a_page_overwrites_a_page_and_nothing_else() {
         &["limit", "--preset=experiment-1", "--html=limit.txt"],
     );
     assert_eq!(ran.status, 2);
-    assert!(ran.stderr.contains("pages are .html"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("expected a file name ending in .html"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
@@ -181,16 +187,16 @@ fn a_study_of_the_spot_has_its_radius_and_curve() {
     assert_eq!(ran.status, 3, "{}", ran.stderr);
     let report = &ran.reports()[0];
     let page = Page::read(&directory.path().join("out/defocus.html"));
-    page.is_titled("Radius of the spot for the best centroids");
+    page.is_titled("Spot radius with the smallest centroid error");
     page.has(&format!(
-        "{:.2} px, where the error is {:.4} px",
+        "{:.2} px, with an error of {:.4} px",
         number(report, "/stars/0/best/radius_px"),
         number(report, "/stars/0/best/error_px")
     ));
     page.has("no radius meets a required error");
     assert_eq!(page.figures(), 4);
     for row in 0..7 {
-        let error = page.cell("Errors over the radius", "error_px", row);
+        let error = page.cell("Error versus radius", "error_px", row);
         assert_eq!(error, report["stars"][0]["curve"][row]["error_px"]);
     }
 }
@@ -396,7 +402,7 @@ fn a_validation_has_its_rates_and_pictures_of_frames_that_failed() {
         24 - all["right"].as_u64().unwrap(),
     );
     assert!(right > 0 && failed > 0, "{all}");
-    page.has(&format!("{right} of 24 frames identified rightly"));
+    page.has(&format!("{right} of 24 frames identified correctly"));
     page.has(&format!(
         "V {:.3}",
         number(summary, "/completeness/predicted_limit_vmag")

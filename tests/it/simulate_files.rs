@@ -264,21 +264,21 @@ fn nonsensical_options_are_refused() {
     sky(&["--date=1990-13-01"], "is not a valid date");
     sky(
         &["--rate-x-deg-s=180", "--exposure=1"],
-        "turns by up to 180°",
+        "rotates by up to 180°",
     );
     sky(
         &["--swing-deg=180", "--swing-period-s=1e-300"],
-        "the camera turns",
+        "the camera rotates",
     );
     sky(
         &["--trails=1", "--trail-rate-deg-s=1e12"],
-        "a satellite turns",
+        "a satellite rotates",
     );
-    sky(&["--distortion-px=300"], "the image folds");
-    sky(&["--distortion-px=-300"], "the image folds");
+    sky(&["--distortion-px=300"], "distortion is too large");
+    sky(&["--distortion-px=-300"], "distortion is too large");
     sky(
         &["--cosmic-rays-cm2-s=1e6", "--exposure=1e6"],
-        "cosmic rays on a frame",
+        "cosmic rays per frame",
     );
     sky(&["--sky-mag-arcsec2=-1e300"], "sky_luminance_cd_m2 is inf");
     assert!(!out.exists());
@@ -318,7 +318,7 @@ fn a_bad_description_is_an_error_of_its_file() {
         ("vignetting = 1.5", "vignetting"),
         ("mirrored = 3", "mirrored"),
         ("spot_form = \"square\"", "spot_form"),
-        ("distortion_px = -900", "the image folds"),
+        ("distortion_px = -900", "distortion is too large"),
         ("decentring_px = 9", "decentring_px"),
     ] {
         fs::write(&camera, format!("{}\n{line}\n", described.stdout)).unwrap();

@@ -1,15 +1,15 @@
-//! The progress bar appears on terminals only.
+//! What differs on a terminal: the progress bar, and the width of tables.
 
 use crate::common::{cache_dir, orion};
 use std::process::Command;
 
-/// What a terminal shows of `starpipe process` over some frames; `redirect` is passed to the shell.
+/// What a terminal shows of `starpipe process` over some frames; `before` and `redirect` are passed to the shell.
 /// `None`, saying so, without util-linux's `script`, which provides the terminal.
-fn shown(redirect: &str) -> Option<String> {
+fn shown(before: &str, format: &str, redirect: &str) -> Option<String> {
     let frame = orion();
     let frames = format!("'{}' ", frame.display()).repeat(6);
     let program = env!("CARGO_BIN_EXE_starpipe");
-    let line = format!("'{program}' process --format json {frames} {redirect}");
+    let line = format!("{before} '{program}' process --format {format} {frames} {redirect}");
     let mut script = Command::new("script");
     script.args(["-qec", &line, "/dev/null"]);
     // The bar needs a terminal that can move its cursor.
@@ -49,7 +49,7 @@ fn results(lines: &[String]) -> usize {
 
 #[test]
 fn a_bar_is_on_the_terminal_and_results_are_complete() {
-    let (Some(alone), Some(both)) = (shown(">/dev/null"), shown("")) else {
+    let (Some(alone), Some(both)) = (shown("", "json", ">/dev/null"), shown("", "json", "")) else {
         return;
     };
     for shown in [&alone, &both] {
@@ -63,10 +63,26 @@ fn a_bar_is_on_the_terminal_and_results_are_complete() {
 fn without_a_terminal_on_standard_error_there_is_no_bar() {
     let directory = tempfile::tempdir().unwrap();
     let errors = directory.path().join("errors");
-    let Some(shown) = shown(&format!("2>'{}'", errors.display())) else {
+    let Some(shown) = shown("", "json", &format!("2>'{}'", errors.display())) else {
         return;
     };
     assert_eq!(std::fs::read_to_string(errors).unwrap(), "");
     assert!(!shown.contains('\u{1b}'));
     assert_eq!(results(&plain_lines(&shown)), 6);
+}
+
+#[test]
+fn a_table_is_as_wide_as_the_terminal() {
+    for (columns, name) in [(60, "…n/orion.png"), (70, "…es/orion/orion.png")] {
+        let Some(shown) = shown(&format!("stty cols {columns};"), "table", "2>/dev/null") else {
+            return;
+        };
+        let lines = plain_lines(&shown);
+        let rows: Vec<&String> = lines.iter().filter(|line| line.ends_with(".png")).collect();
+        assert_eq!(rows.len(), 6, "{shown}");
+        for row in rows {
+            assert_eq!(row.chars().count(), columns, "{row}");
+            assert!(row.ends_with(name), "{row}");
+        }
+    }
 }

@@ -200,15 +200,9 @@ fn an_extended_run_equals_the_longer_run() {
 fn a_directory_of_another_run_is_refused() {
     let (directory, out) = forty_frames();
     for (more, expected) in [
-        (&["--seed", "2"][..], "seed is 1 there, but 2 here"),
-        (
-            &["--exposure", "0.3"],
-            "exposure_s is 0.1 there, but 0.3 here",
-        ),
-        (
-            &["--scale-unknown"],
-            "scale_known is true there, but false here",
-        ),
+        (&["--seed", "2"][..], "seed was 1, now 2"),
+        (&["--exposure", "0.3"], "exposure_s was 0.1, now 0.3"),
+        (&["--scale-unknown"], "scale_known was true, now false"),
     ] {
         let ran = validate(&out, &[&["--count", "40"], more].concat());
         assert_eq!(ran.status, 2, "{}", ran.stderr);
@@ -250,7 +244,7 @@ fn a_modified_table_is_reported_with_the_position() {
             "line 5: unknown variant `rihgt`, expected one of `right`",
         ),
         (with_line(5, "3,1"), "line 5: 2 fields, expected 42"),
-        (with_line(5, rows[5]), "line 5: frame 4 with the seed"),
+        (with_line(5, rows[5]), "line 5: frame 4 with seed"),
         (
             with_line(1, "a,b"),
             "line 1: not the heading of a table of frames",

@@ -3,11 +3,11 @@ import { byId } from "./dom.js";
 
 /** What a remedy of the report leads to: the field of the form, and the words of its button. */
 const REMEDIES = {
-  fov: ["fov", "State the width of the field"],
-  pixel_scale: ["pixel_scale", "State the angle of a pixel"],
-  near: ["near", "State where it points"],
-  radius: ["radius", "State how far from there"],
-  date: ["date", "State the date"],
+  fov: ["fov", "Enter the width of the field"],
+  pixel_scale: ["pixel_scale", "Enter the pixel scale"],
+  near: ["near", "Enter the approximate direction"],
+  radius: ["radius", "Enter the search radius"],
+  date: ["date", "Enter the date"],
   sigma: ["sigma", "Change the detection threshold"],
   time_limit: ["thorough", "Search longer"],
 };

@@ -45,6 +45,6 @@ if ("serviceWorker" in navigator) {
   });
   prepared.then(() => navigator.serviceWorker.register("sw.js")).then((found) => Promise.race([navigator.serviceWorker.ready, refused(found)])).then(
     () => { byId("offline").textContent = "Ready to work offline."; },
-    () => { byId("offline").textContent = "This browser does not keep it for offline use."; },
+    () => { byId("offline").textContent = "This browser does not store the page for offline use."; },
   );
 }

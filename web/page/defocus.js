@@ -28,7 +28,7 @@ const run = async (event) => {
   const [start, cancel] = [byId("defocus-run"), byId("defocus-cancel")];
   start.disabled = true;
   cancel.hidden = false;
-  byId("defocus-answer").textContent = "Stars are being measured.";
+  byId("defocus-answer").textContent = "Measuring simulated stars.";
   try {
     const report = JSON.parse(await engine.call("defocus", JSON.stringify(study())));
     byId("defocus-json").textContent = JSON.stringify(report, null, 1);
@@ -44,12 +44,12 @@ const run = async (event) => {
 const show = (report) => {
   const [star] = report.stars;
   const whose = star.vmag === null ? "Spots with the same brightest pixel" : `A star of V ${star.vmag}`;
-  byId("defocus-answer").textContent = `${whose}: the best spot has a radius of ${spot(star.best)}, and an error of ${star.best.error_px.toFixed(4)} px.`;
-  const facts = [["Within 5 % of it", `${star.best.nearly_px.map((px) => px.toFixed(2)).join(" to ")} px`]];
+  byId("defocus-answer").textContent = `${whose}: the centroid error is smallest, ${star.best.error_px.toFixed(4)} px, with a spot radius of ${spot(star.best)}.`;
+  const facts = [["Radii with at most 5 % more error", `${star.best.nearly_px.map((px) => px.toFixed(2)).join(" to ")} px`]];
   for (const { required_error_px, smallest, largest } of star.required) {
-    facts.push([`Error of ${required_error_px} px or less`, smallest ? `from ${spot(smallest)} to ${spot(largest)}` : "no radius meets it"]);
+    facts.push([`Error of ${required_error_px} px or less`, smallest ? `from ${spot(smallest)} to ${spot(largest)}` : "no radius"]);
   }
-  if (star.present) facts.push(["The camera as it is", `${spot(star.present)}: error ${star.present.error_px.toFixed(4)} px`]);
+  if (star.present) facts.push(["This camera as described", `${spot(star.present)}: error ${star.present.error_px.toFixed(4)} px`]);
   byId("defocus-facts").replaceChildren(...factsOf(facts));
   draw(star);
 };
@@ -59,7 +59,7 @@ const draw = (star) => {
   const measured = star.curve.filter((row) => row.error_px !== null);
   const most = Math.max(...measured.map((row) => row.error_px)) * 1.05;
   const radii = measured.map((row) => row.radius_px);
-  const plot = makeFigure(holder, "Error of the centroid over the radius of the spot; the dashed line is the bound", ["radius σ (px)", Math.min(...radii), Math.max(...radii)], ["error (px)", 0, most]);
+  const plot = makeFigure(holder, "Centroid error against spot radius; dashed: Cramér-Rao bound", ["radius σ (px)", Math.min(...radii), Math.max(...radii)], ["error (px)", 0, most]);
   const path = (key, kind) => {
     const rows = measured.filter((row) => row[key] !== null && row[key] <= most);
     if (rows.length > 1) make(plot.svg, "path", { class: kind, d: pathThrough(plot, rows.map((row) => [row.radius_px, row[key]])) });
@@ -71,7 +71,7 @@ const draw = (star) => {
   const limits = star.curve.filter((row) => row.limit_vmag !== null);
   if (limits.length > 1) {
     const all = limits.map((row) => row.limit_vmag);
-    const reach = makeFigure(holder, "Limit over the radius: half of the stars of this magnitude are found", ["radius σ (px)", limits[0].radius_px, limits[limits.length - 1].radius_px], ["V (mag)", Math.min(...all) - 0.1, Math.max(...all) + 0.1]);
+    const reach = makeFigure(holder, "Limiting magnitude against spot radius: half of the stars of this magnitude are detected", ["radius σ (px)", limits[0].radius_px, limits[limits.length - 1].radius_px], ["V (mag)", Math.min(...all) - 0.1, Math.max(...all) + 0.1]);
     make(reach.svg, "path", { class: "line", d: pathThrough(reach, limits.map((row) => [row.radius_px, row.limit_vmag])) });
   }
   byId("defocus-figures").replaceChildren(holder);

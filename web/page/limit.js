@@ -82,9 +82,9 @@ const fillSliders = () => {
   for (const slider of SLIDERS) {
     const value = values[slider.names[0]] ?? presetValue(slider.names[0]);
     slider.number.value = value === null ? "" : String(Number(value.toPrecision(6)));
-    slider.number.placeholder = value === null ? "by wavelength" : "";
+    slider.number.placeholder = value === null ? "curve" : "";
     slider.range.value = String(value === null ? STEPS / 2 : stepOf(slider, value));
-    slider.range.setAttribute("aria-valuetext", value === null ? "by wavelength, as the preset has it" : String(value));
+    slider.range.setAttribute("aria-valuetext", value === null ? "varies with wavelength, as in the preset" : String(value));
   }
 };
 
@@ -122,7 +122,7 @@ const predict = async () => {
   } catch (error) {
     if (number !== asked) return;
     byId("limit-answer").textContent = error.message;
-    hideSky("There is no frame.");
+    hideSky("No simulated frame.");
     byId("limit-facts").replaceChildren();
     byId("limit-figures").replaceChildren();
     byId("limit-budget").tBodies[0].replaceChildren();
@@ -134,14 +134,14 @@ const mag = (value) => (value === null || value === undefined ? "none" : `V ${va
 const short = (value) => String(Number(value.toPrecision(5)));
 
 const show = (row) => {
-  byId("limit-answer").textContent = `This camera finds half of the stars of ${mag(row.detector.limit50_vmag)}. The brightest pixel of a star of ${mag(row.limit_vmag)} has ${short(row.snr)} times its noise.`;
+  byId("limit-answer").textContent = `This camera detects half of the stars of ${mag(row.detector.limit50_vmag)}. For a star of ${mag(row.limit_vmag)}, the brightest pixel has a signal-to-noise ratio of ${short(row.snr)}.`;
   const facts = [
-    ["Half are found at", mag(row.detector.limit50_vmag)], ["Nine in ten are found at", mag(row.detector.limit90_vmag)],
-    ["Limit by the brightest pixel", mag(row.limit_vmag)], ["Light of that star", `${short(row.star_e)} e`],
-    ["Sky in a pixel", `${short(row.background_e)} e`], ["Noise", `${short(row.noise_e)} e`], ["Airmass", short(row.airmass)],
-    ["Equations", row.reading === "paper" ? "the paper's own" : "physical"],
+    ["50 % of stars detected at", mag(row.detector.limit50_vmag)], ["90 % of stars detected at", mag(row.detector.limit90_vmag)],
+    ["Limit for the brightest pixel alone", mag(row.limit_vmag)], ["Signal of that star in the brightest pixel", `${short(row.star_e)} e`],
+    ["Sky background per pixel", `${short(row.background_e)} e`], ["Noise of the brightest pixel", `${short(row.noise_e)} e`], ["Airmass", short(row.airmass)],
+    ["Equations", row.reading === "paper" ? "as in the paper" : "physical"],
   ];
-  if (row.faintest) facts.splice(3, 0, ["Faintest star to be expected in a field", `V ${row.faintest.mean_vmag.toFixed(2)} ± ${row.faintest.sigma_mag.toFixed(2)}`]);
+  if (row.faintest) facts.splice(3, 0, ["Expected faintest star in a field", `V ${row.faintest.mean_vmag.toFixed(2)} ± ${row.faintest.sigma_mag.toFixed(2)}`]);
   byId("limit-facts").replaceChildren(...factsOf(facts));
   const body = byId("limit-budget").tBodies[0];
   body.replaceChildren();
@@ -181,7 +181,7 @@ const drawCurves = async (row, number) => {
     if (points.length < 2) continue;
     const slider = SLIDERS.find((one) => one.names[0] === name);
     const all = points.map(([, v]) => v);
-    const plot = makeFigure(holder, `Half are found at, over the ${slider.title.toLowerCase()}; the dot is this camera`,
+    const plot = makeFigure(holder, `Magnitude at which half of the stars are detected, against ${slider.title.toLowerCase()}; dot: this camera`,
       [`log10 ${slider.title.toLowerCase()}`, points[0][0], points[points.length - 1][0]], ["V (mag)", Math.min(...all) - 0.2, Math.max(...all) + 0.2]);
     make(plot.svg, "path", { class: "line", d: pathThrough(plot, points) });
     if (row.detector.limit50_vmag !== null) make(plot.svg, "circle", { class: "point", cx: plot.x(Math.log10(value)), cy: plot.y(row.detector.limit50_vmag), r: 4 });
@@ -200,7 +200,7 @@ const setUp = async () => {
       await navigator.clipboard.writeText(location.href);
       byId("limit-link").textContent = "Copied";
     } catch {
-      byId("limit-link").textContent = "The address of this page is the link";
+      byId("limit-link").textContent = "Copy the link from the address bar";
     }
   });
   setUpSky((chosen) => { place = chosen; changed(); });

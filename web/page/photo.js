@@ -9,7 +9,7 @@ import { showFrame } from "./views.js";
 
 /** Stages as people are told of them, in their order. */
 const STAGES = [
-  ["program", "Load the program"], ["catalog", "Load the catalog"], ["index", "Index it"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
+  ["program", "Load the program"], ["catalog", "Load the catalog"], ["index", "Index the catalog"], ["read", "Read"], ["detect", "Find stars"], ["pointing", "Where it points"],
   ["naming", "Name the stars"], ["photometry", "Measure brightness"],
 ];
 /** Files that browsers show themselves. */
@@ -76,12 +76,12 @@ const tell = (text, isError = false) => {
 };
 
 /** What is prepared, in words. */
-let preparing = "The program is being prepared.";
+let preparing = "Loading the program.";
 
 /** How much of what is loaded is here. */
 const tellAmount = (stage, share) => {
   const isProgram = stage === "program" && share < 1;
-  const now = isProgram ? "The program is being prepared." : "The catalog of stars is being prepared.";
+  const now = isProgram ? "Loading the program." : "Loading the star catalog.";
   if (byId("state").textContent === preparing && now !== preparing) tell(now);
   preparing = now;
   const all = bytesOf(stage, [STARS, NUMBERS]) / 1e6;
@@ -164,7 +164,7 @@ const restore = async () => {
     const wasSolving = kept.state === "runs";
     // Answers of another version do not fit this one.
     if (wasSolving || (kept.state === "done" && build !== BUILD)) kept.state = "waits";
-    if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was given up: the page ended while it was solved.` });
+    if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was not solved: the page was closed or crashed during each attempt.` });
     enqueue(kept);
   }
   if (pictures.length) choose(pictures.find(({ state }) => state === "done") ?? pictures[0]);
@@ -172,7 +172,7 @@ const restore = async () => {
 };
 
 const clear = async () => {
-  if (!confirm("Remove all pictures and answers from this page?")) return;
+  if (!confirm("Remove all pictures and results from this page?")) return;
   for (const picture of pictures.splice(0)) picture.state = "failed";
   stop();
   [chosen, byId("again").disabled] = [null, true];
@@ -294,7 +294,7 @@ const glance = async (picture) => {
   try {
     const report = JSON.parse(await scout.call("glance", picture.file, picture.options, picture.equipment));
     if (picture !== running || isReady || report.status !== "identified") return;
-    tell(`The bright stars alone say: ${direction(report.attitude)}. The catalog of stars is being prepared for the full answer.`);
+    tell(`First result, from the brightest stars only: ${direction(report.attitude)}. Loading the star catalog for the full result.`);
   } catch { /* the full search tells why */ }
 };
 
@@ -327,7 +327,7 @@ const showResult = async (picture, isNew = false) => {
   byId("answer").replaceChildren(view);
   showFrame(view, JSON.parse(result.data));
   const took = `${(report.timing_ms.total / 1000).toFixed(2)} s`;
-  if (!running) tell(report.status === "identified" ? `${picture.file.name} is solved, in ${took}.` : `${picture.file.name} has no answer, after ${took}.`);
+  if (!running) tell(report.status === "identified" ? `${picture.file.name} was solved in ${took}.` : `${picture.file.name} was not identified after ${took}.`);
   if (isNew) bringToTop("answer");
 };
 
@@ -346,7 +346,7 @@ const buttons = (picture, report, result) => {
   const draw = async (kind, type) => new Blob([await engine.call("draw", key(picture), picture.file, picture.options, picture.equipment, kind, layers())], { type });
   const saveDrawn = (kind, type, extension) => draw(kind, type).then((blob) => save(blob, `${stem}.${extension}`), (error) => tell(error.message, true));
   /** @type {[string, (button: HTMLButtonElement) => unknown][]} */
-  const first = [["Save the picture", () => saveDrawn("overlay", "image/png", "annotated.png")]];
+  const first = [["Save the annotated picture", () => saveDrawn("overlay", "image/png", "annotated.png")]];
   if (canShare()) first.unshift(["Share", () => share(() => draw("overlay", "image/png"), `${stem}.png`, sentence(report))]);
   if (report.status === "identified") first.push(["Copy link: what would this camera see?", (button) => copyLink(cameraLink(report), button)]);
   /** @type {[string, () => unknown][]} */
@@ -357,7 +357,7 @@ const buttons = (picture, report, result) => {
   ];
   if (report.status === "identified") files.push(["Coordinates (FITS header)", () => saveDrawn("wcs", "application/fits", "wcs")]);
   const fold = Object.assign(document.createElement("details"), { id: "download-fold" });
-  fold.append(Object.assign(document.createElement("summary"), { textContent: "Files of the answer" }), actions("Downloads", files));
+  fold.append(Object.assign(document.createElement("summary"), { textContent: "Download results" }), actions("Downloads", files));
   return [actions("Answer", first), fold];
 };
 
@@ -370,7 +370,7 @@ const share = async (draw, name, text) => {
     if (drawn.name !== name + layers()) drawn = { name: name + layers(), file: new File([await draw()], name, { type: "image/png" }) };
     await navigator.share({ files: drawn.file ? [drawn.file] : [], text });
   } catch (error) {
-    if (error.name === "NotAllowedError") tell("The picture is drawn. Press Share once more.");
+    if (error.name === "NotAllowedError") tell("The picture is ready. Press Share again.");
     else if (error.name !== "AbortError") tell(error.message, true);
   }
 };

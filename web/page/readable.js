@@ -88,7 +88,7 @@ const pixelsOf = async (file, format) => {
   const bitmap = await createImageBitmap(file, { colorSpaceConversion: "none", premultiplyAlpha: "none", imageOrientation })
     .catch(() => { throw new Error(`${file.name}: this browser does not open ${format}. Save the photograph as JPEG or PNG.`); });
   const canvas = new OffscreenCanvas(bitmap.width, bitmap.height), pen = canvas.getContext("2d", { willReadFrequently: true });
-  if (!pen) throw new Error(`${file.name}: no memory for the picture`);
+  if (!pen) throw new Error(`${file.name}: not enough memory for the picture`);
   pen.drawImage(bitmap, 0, 0);
   bitmap.close();
   return pen.getImageData(0, 0, canvas.width, canvas.height);
@@ -103,5 +103,5 @@ export const readable = async (file) => {
   const format = formatOf(bytes);
   if (!format) return { bytes, said: "" };
   const image = await pixelsOf(file, format);
-  return { bytes: pngOf(image, exifOf(bytes, format)), said: `This browser decoded the ${format} file, with 8 bits of each color.` };
+  return { bytes: pngOf(image, exifOf(bytes, format)), said: `This browser decoded the ${format} file, with 8 bits per color.` };
 };

@@ -2,7 +2,7 @@
 import { byId } from "./dom.js";
 
 /** Grey levels: as `web/src/simulated.rs` has them. */
-const GREY = "Black is 3 times the noise below the sky, white 12 times above.";
+const GREY = "Black is 3 noise standard deviations below the sky level, white is 12 above.";
 /** The faintest stars that are all there: of the bright stars, and of the whole catalog. */
 const BRIGHT_VMAG = 6.5, WHOLE_VMAG = 9;
 const RING_PX = 9;
@@ -29,8 +29,8 @@ const stars = (count) => `${count} ${count === 1 ? "star" : "stars"}`;
 
 /** @param {About} about */
 const counted = ({ star_count, limit50_vmag, brighter_px, is_full }) => {
-  const brighter = limit50_vmag === null ? "There is no limit." : `${brighter_px.length} of them ${brighter_px.length === 1 ? "is" : "are"} brighter than the limit of V ${limit50_vmag.toFixed(2)}.`;
-  return `${stars(star_count)} of the catalog ${star_count === 1 ? "is" : "are"} drawn. ${brighter}${is_full ? " The sky alone fills the pixels, which the limit does not consider: no star can be seen." : ""}`;
+  const brighter = limit50_vmag === null ? "The camera has no limiting magnitude." : `${brighter_px.length} of them ${brighter_px.length === 1 ? "is" : "are"} brighter than the limit of V ${limit50_vmag.toFixed(2)}.`;
+  return `${stars(star_count)} of the catalog ${star_count === 1 ? "is" : "are"} drawn. ${brighter}${is_full ? " The sky background alone saturates the pixels, so no star can be seen; the limit does not account for this." : ""}`;
 };
 
 /** @param {About} about */
@@ -42,7 +42,7 @@ const caption = (about) => {
   const said = [isPart ? `The middle of the frame: ${size}, of ${width} × ${height} pixels.` : `The whole frame: ${size}.`, counted(about)];
   const complete = is_whole_catalog ? WHOLE_VMAG : BRIGHT_VMAG;
   if (limit50_vmag > complete) said.push(is_whole_catalog ? `The limit is fainter than the catalog: beyond V ${complete} many stars are missing.` : `Stars fainter than V ${complete} are drawn once the catalog is loaded.`);
-  if (about.faintest_vmag !== null) said.push(`Stars fainter than V ${about.faintest_vmag.toFixed(1)} are left out: so many would take long.`);
+  if (about.faintest_vmag !== null) said.push(`Stars fainter than V ${about.faintest_vmag.toFixed(1)} are not drawn: there are too many to simulate quickly.`);
   said.push(GREY);
   return said.join(" ");
 };

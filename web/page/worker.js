@@ -184,7 +184,7 @@ onmessage = async ({ data: { id, call, values, module } }) => {
     const isFatal = error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
     let text = error.message;
     if (isFatal) {
-      try { text = starpipe.latest_panic() ?? `the computation was ended: ${text}`; } catch { /* nothing more is known */ }
+      try { text = starpipe.latest_panic() ?? `the computation was aborted: ${text}`; } catch { /* nothing more is known */ }
     }
     postMessage({ id, error: text, isFatal });
   }

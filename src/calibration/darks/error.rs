@@ -29,7 +29,8 @@ pub enum DarksError {
     },
     /// Too many different exposures.
     #[error(
-        "{frame}: found another exposure, {exposure_s} s, expected at most {MAX_EXPOSURES} different ones"
+        "{frame}: too many different exposures: {exposure_s} s is one more than the maximum of \
+         {MAX_EXPOSURES}"
     )]
     TooManyExposures {
         /// The frame with one exposure too many.

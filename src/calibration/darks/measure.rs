@@ -239,7 +239,8 @@ fn missing(
     let mut missing = Vec::new();
     let mut add = |what, reason: String| missing.push(MissingQuantity { what, reason });
     if groups.iter().all(|group| group.frames < 2) {
-        let reason = "no two frames have the same exposure: noise and pattern cannot be separated";
+        let reason =
+            "no two frames have the same exposure: noise and fixed pattern cannot be separated";
         for what in [
             "temporal_noise",
             "read_noise",
@@ -269,13 +270,14 @@ fn missing(
         );
     }
     if full_scale.is_none() {
-        let reason = "full scale is unknown: give the detector's bits or the camera";
+        let reason =
+            "full scale is unknown: give the bit depth of the detector or a camera description";
         add("relative", reason.to_owned());
     }
     if config.gain_e_per_adu.is_none() {
         add(
             "electrons",
-            "the gain is unknown: give the camera's description".to_owned(),
+            "the gain is unknown: give a camera description".to_owned(),
         );
     }
     missing

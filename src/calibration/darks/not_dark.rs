@@ -59,7 +59,8 @@ impl fmt::Display for NotDark {
                 median_adu,
             } => write!(
                 f,
-                "its mean level is {mean_adu:.2}, that of the others of its exposure {median_adu:.2}"
+                "its mean level is {mean_adu:.2}, but the median of the frames with the same exposure is \
+                 {median_adu:.2}"
             ),
         }
     }

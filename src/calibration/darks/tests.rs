@@ -128,7 +128,7 @@ fn sizes_that_differ_and_exposures_without_end_are_refused() {
     );
     let refused = add("c.fits", 9, 99.0).unwrap_err().to_string();
     assert!(
-        refused.starts_with("c.fits: found another exposure, 99 s"),
+        refused.starts_with("c.fits: too many different exposures: 99 s"),
         "{refused}"
     );
     assert!(matches!(

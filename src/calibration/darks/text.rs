@@ -45,7 +45,7 @@ impl DarksReport {
         if let (Some(full), Some(source)) = (self.full_scale_adu, &self.full_scale_source) {
             line(
                 "full scale",
-                format!("{full} levels, by {}", source_text(source)),
+                format!("{full} levels, from {}", source_text(source)),
             );
         }
         if let Some(noise) = self.read_noise_adu {
@@ -77,9 +77,9 @@ impl DarksReport {
 
 fn source_text(source: &str) -> &str {
     match source {
-        "option" => "the bits that were given",
-        "camera" => "the camera's description",
-        _ => "the file's format, which may have more bits than the detector",
+        "option" => "the given bit depth",
+        "camera" => "the camera description",
+        _ => "the file format, which may have more bits than the detector",
     }
 }
 
@@ -113,7 +113,7 @@ fn exposure_text(exposure: &ExposureReport) -> String {
         text += &format!(", noise {noise}");
     }
     if let Some(drift) = exposure.frame_to_frame_adu {
-        text += &format!(", from frame to frame {drift:.3} ADU");
+        text += &format!(", frame-to-frame drift {drift:.3} ADU");
     }
     text
 }
@@ -121,17 +121,17 @@ fn exposure_text(exposure: &ExposureReport) -> String {
 fn pattern_text(pattern: &PatternReport) -> String {
     let fixed = match pattern.fixed_pattern_adu {
         Some(fixed) => with(fixed, "ADU", pattern.fixed_pattern_e.map(electrons)),
-        None => format!("with noise {:.3} ADU", pattern.spatial_adu),
+        None => format!("{:.3} ADU (includes noise)", pattern.spatial_adu),
     };
     format!(
-        "{fixed}; of columns {:.3}, of rows {:.3} ADU",
+        "{fixed}; columns {:.3} ADU, rows {:.3} ADU",
         pattern.column_adu, pattern.row_adu
     )
 }
 
 fn hot_pixels_text(hot: &HotPixelsReport) -> String {
     format!(
-        "{} ({:.4} %) beyond {} deviations: {} by level, {} by dark current, {} by noise",
+        "{} ({:.4} %) beyond {} standard deviations: {} in level, {} in dark current, {} in noise",
         hot.count,
         hot.share * 100.0,
         hot.hot_sigma,
@@ -146,7 +146,7 @@ fn current_text(current: &DarkCurrentReport) -> String {
         format!(" ({})", plus_minus(value, current.median_sigma_e_s, "e/s"))
     });
     format!(
-        "{}{in_electrons} in the median, {} on average",
+        "{}{in_electrons} median, {} mean",
         plus_minus(current.median_adu_s, current.median_sigma_adu_s, "ADU/s"),
         plus_minus(current.mean_adu_s, current.mean_sigma_adu_s, "ADU/s")
     )

@@ -41,7 +41,7 @@ pub enum FlatsError {
     },
     /// A frame that is no brighter than the dark.
     #[error(
-        "{frame} has no light in it: found a mean of {level_adu} ADU above the dark, expected more than 0"
+        "{frame} shows no light: found a mean of {level_adu} ADU above the dark, expected more than 0"
     )]
     NoLight {
         /// The frame.

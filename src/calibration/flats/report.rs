@@ -77,13 +77,13 @@ impl Flats {
         if self.pixel_nonuniformity.is_none() {
             missing.insert(
                 "pixel_nonuniformity",
-                "one frame does not separate pattern from noise",
+                "with one frame, the fixed pattern cannot be separated from the noise",
             );
         }
         if self.gain.is_none() {
             let reason = match self.pairs[..] {
-                [] => "no two frames in a row have the same light",
-                _ => "the noise does not grow with the light",
+                [] => "no two consecutive frames have the same level",
+                _ => "the noise does not increase with the signal",
             };
             missing.insert("gain", reason);
         }

@@ -123,7 +123,7 @@ fn frames_that_are_no_flats_are_refused() {
     };
     assert_eq!(
         refused(dark, config.clone()),
-        "a.fits has no light in it: found a mean of 0 ADU above the dark, expected more than 0"
+        "a.fits shows no light: found a mean of 0 ADU above the dark, expected more than 0"
     );
     let wide = Frame::new(4, 3, vec![200.0; 12]).unwrap();
     assert_eq!(

@@ -19,7 +19,7 @@ pub enum DataSheetError {
         source: std::io::Error,
     },
     /// The file is larger than any data sheet.
-    #[error("{}: larger than {limit} bytes: too large for a description of a camera", path.display())]
+    #[error("{}: larger than {limit} bytes: too large for a camera description", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,

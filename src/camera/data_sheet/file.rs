@@ -281,7 +281,7 @@ impl<'a> SheetFile<'a> {
             )),
             Some(value) => match value.get_ref() {
                 toml::Value::String(name) => Ok(name.clone()),
-                _ => Err(self.invalid("name", value, "a text in quotes".to_owned())),
+                _ => Err(self.invalid("name", value, "a quoted string".to_owned())),
             },
         }
     }
@@ -466,7 +466,7 @@ mod tests {
             (
                 "read_noise_e",
                 "read_noise_e = nan",
-                "read_noise_e is nan, expected a number from 0 up",
+                "read_noise_e is nan, expected a number of 0 or more",
             ),
             (
                 "read_noise_e",
@@ -503,7 +503,7 @@ mod tests {
                 "bias_adu = 1e6",
                 "beyond the full scale of 12 bits",
             ),
-            ("name", "name = 5", "name is 5, expected a text in quotes"),
+            ("name", "name = 5", "name is 5, expected a quoted string"),
         ] {
             let error = parsed(&with(key, line)).unwrap_err();
             let error = format!(

@@ -41,7 +41,7 @@ impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Positive => write!(f, "a number above 0"),
-            Self::NotNegative => write!(f, "a number from 0 up"),
+            Self::NotNegative => write!(f, "a number of 0 or more"),
             Self::Share => write!(f, "a number above 0 and at most 1"),
             Self::Whole(from, to) => write!(f, "a whole number from {from} to {to}"),
             Self::FromTo(from, to) => write!(f, "a number from {from} to {to}"),

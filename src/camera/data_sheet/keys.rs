@@ -52,7 +52,7 @@ pub const KEYS: &[Key<DataSheet>] = &[
     },
     Key {
         name: "quantum_efficiency",
-        about: "electrons per photon on a pixel (peak, if it is a curve)",
+        about: "quantum efficiency: electrons per photon (peak, if it is a curve)",
         limits: NumberRange::Share,
         get: |sheet| Some(sheet.quantum_efficiency.peak()),
         set: |sheet, peak| sheet.quantum_efficiency = sheet.quantum_efficiency.with_peak(peak),
@@ -87,11 +87,11 @@ pub const KEYS: &[Key<DataSheet>] = &[
         NumberRange::Positive,
         "gain, in electrons per gray level"
     ),
-    key!(bits, NumberRange::Whole(1.0, 32.0), "bits of a gray level"),
+    key!(bits, NumberRange::Whole(1.0, 32.0), "bit depth"),
     key!(
         bias_adu,
         NumberRange::NotNegative,
-        "bias: gray level without light"
+        "bias level: gray level without light"
     ),
     Key {
         name: "spot_sigma_px",
@@ -106,7 +106,7 @@ pub const KEYS: &[Key<DataSheet>] = &[
     },
     Key {
         name: "peak_share",
-        about: "share of a star's light on its brightest pixel (default: from spot_sigma_px)",
+        about: "fraction of a star's light in its brightest pixel (default: from spot_sigma_px)",
         limits: NumberRange::Share,
         get: |sheet| Some(sheet.peak_share()),
         set: |sheet, share| sheet.peak_share = Some(share),
@@ -124,40 +124,40 @@ const ABERRATION_PX: NumberRange = NumberRange::FromTo(-50.0, 50.0);
 
 /// The numbers of the imperfections, all of them optional.
 pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
-    key!(vignetting in imperfections, FRACTION, "share of the light lost in the corners"),
+    key!(vignetting in imperfections, FRACTION, "vignetting: fraction of the light lost in the corners"),
     key!(field_radius_deg in imperfections,
         NumberRange::FromTo(1.0, 110.0),
-        "radius of the field of a lens other than a pinhole, as an angle from the axis, in degrees"
+        "field radius of a non-rectilinear lens, as an angle from the axis, in degrees"
     ),
     key!(distortion_px in imperfections,
         DISPLACEMENT_PX,
-        "radial distortion of third order: outward displacement of a star in the corner, in pixels"
+        "third-order radial distortion: outward displacement of a star in the corner, in pixels"
     ),
-    key!(distortion5_px in imperfections, DISPLACEMENT_PX, "the same of fifth order"),
-    key!(distortion7_px in imperfections, DISPLACEMENT_PX, "the same of seventh order"),
+    key!(distortion5_px in imperfections, DISPLACEMENT_PX, "fifth-order radial distortion, in pixels"),
+    key!(distortion7_px in imperfections, DISPLACEMENT_PX, "seventh-order radial distortion, in pixels"),
     key!(decentring_x_px in imperfections,
         DISPLACEMENT_PX,
-        "decentered lens, along x: displacement at the distance of the corner, in pixels"
+        "decentering distortion along x: displacement at the corner distance, in pixels"
     ),
     key!(decentring_y_px in imperfections,
         DISPLACEMENT_PX,
-        "decentered lens, along y: displacement at the distance of the corner, in pixels"
+        "decentering distortion along y: displacement at the corner distance, in pixels"
     ),
     key!(axis_x_px in imperfections,
         AXIS_PX,
-        "where the axis of the lens meets the frame: right of its center, in pixels"
+        "x offset of the optical axis from the center of the frame, in pixels"
     ),
     key!(axis_y_px in imperfections,
         AXIS_PX,
-        "where the axis of the lens meets the frame: below its center, in pixels"
+        "y offset of the optical axis from the center of the frame, downward, in pixels"
     ),
     key!(stretch_px in imperfections,
         DISPLACEMENT_PX,
-        "larger scale along x than along y: displacement at the distance of the corner, in pixels"
+        "scale along x larger than along y: displacement at the corner distance, in pixels"
     ),
     key!(skew_px in imperfections,
         DISPLACEMENT_PX,
-        "larger scale along one diagonal: displacement at the distance of the corner, in pixels"
+        "scale along one diagonal larger than along the other: displacement at the corner distance, in pixels"
     ),
     key!(spot_axis_ratio in imperfections,
         NumberRange::FromTo(1.0, 10.0),
@@ -165,11 +165,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(spot_angle_deg in imperfections,
         NumberRange::FromTo(-180.0, 180.0),
-        "direction of the longer axis, from x towards y, in degrees"
+        "direction of the longer axis of a star's spot, from x towards y, in degrees"
     ),
     key!(coma_px in imperfections,
         ABERRATION_PX,
-        "coma: length of the flare of a star in the corner, in pixels, outward positive"
+        "coma: length of the comatic flare of a star in the corner, positive outward, in pixels"
     ),
     key!(astigmatism_px in imperfections,
         ABERRATION_PX,
@@ -177,11 +177,11 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(field_curvature_px in imperfections,
         ABERRATION_PX,
-        "curvature of the field: radius of the disc of a star in the corner, in pixels"
+        "field curvature: radius of the blur disk of a star in the corner, in pixels"
     ),
     key!(moffat_beta in imperfections,
         NumberRange::FromTo(1.2, 100.0),
-        "exponent of a Moffat profile"
+        "exponent (beta) of a Moffat profile"
     ),
     key!(obstruction in imperfections,
         NumberRange::FromTo(0.0, 0.95),
@@ -189,19 +189,19 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(spot_step_px in imperfections,
         NumberRange::FromTo(0.01, 5.0),
-        "distance of the samples of a spot from a file, in pixels"
+        "spacing of the samples in spot_file, in pixels"
     ),
     key!(jpeg_quality in imperfections,
         NumberRange::FromTo(0.0, 100.0),
-        "quality of the JPEG of a color camera: mosaic, demosaicing, eight bits; 0: no JPEG"
+        "JPEG quality of a simulated color camera (mosaic, demosaicing, 8 bits); 0: no JPEG"
     ),
     key!(tone_gamma in imperfections,
         NumberRange::FromTo(1.0, 5.0),
-        "exponent of the tone curve of that JPEG"
+        "exponent of the tone curve of the JPEG"
     ),
     key!(denoise_px in imperfections,
         NumberRange::FromTo(0.0, 5.0),
-        "standard deviation of the smoothing before that JPEG, in pixels"
+        "standard deviation of the smoothing before JPEG compression, in pixels"
     ),
     key!(response_sigma in imperfections,
         FRACTION,
@@ -233,7 +233,7 @@ pub const IMPERFECTION_KEYS: &[Key<DataSheet>] = &[
     ),
     key!(blooming in imperfections,
         FRACTION,
-        "share of the charge above full well that flows along the column"
+        "blooming: fraction of the charge above full well that flows along the column"
     ),
     key!(depth_um in imperfections,
         NumberRange::FromTo(0.1, 1000.0),

@@ -50,11 +50,13 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Option<KnownLens>, DataSh
 impl LensTable {
     fn lens(self) -> Result<KnownLens, String> {
         let projection = Projection::named(&self.projection)
-            .ok_or_else(|| format!("there is no projection '{}'", excerpt(&self.projection)))?;
+            .ok_or_else(|| format!("unknown projection '{}'", excerpt(&self.projection)))?;
         let [width_px, height_px] = [self.width_px, self.height_px].map(f64::from);
         let is_size = |side: f64| (1.0..=1e6).contains(&side);
         if !is_size(width_px) || !is_size(height_px) {
-            return Err(format!("no frame has {width_px} x {height_px} pixels"));
+            return Err(format!(
+                "the frame size is {width_px} x {height_px} pixels, expected 1 to 1000000 pixels on each side"
+            ));
         }
         let focal_px = self.focal_length_px;
         if !(1.0..=1e9).contains(&focal_px) {
@@ -79,8 +81,10 @@ impl LensTable {
             return Err("covariance is not square".to_owned());
         }
         let covariance = DMatrix::from_fn(side, side, |row, column| self.covariance[row][column]);
-        KnownLens::new(camera, covariance)
-            .ok_or_else(|| "covariance is not that of ln focal_length_px and terms_px".to_owned())
+        KnownLens::new(camera, covariance).ok_or_else(|| {
+            "covariance is not a valid covariance matrix of ln(focal_length_px) and terms_px"
+                .to_owned()
+        })
     }
 
     fn distortion(&self) -> Result<Option<Distortion>, String> {
@@ -90,7 +94,7 @@ impl LensTable {
         let model = DistortionModel::ALL
             .into_iter()
             .find(|model| model.name() == name);
-        let model = model.ok_or_else(|| format!("there is no distortion '{}'", excerpt(name)))?;
+        let model = model.ok_or_else(|| format!("unknown distortion '{}'", excerpt(name)))?;
         let radius_px = self.radius_px.filter(|radius_px| *radius_px >= 1.0);
         let radius_px = radius_px.ok_or("radius_px is missing, or below 1")?;
         let terms = &self.terms_px;
@@ -143,17 +147,17 @@ mod tests {
     fn what_is_wrong_is_named() {
         let text = lens().to_toml(&[]);
         for (from, to, expected) in [
-            ("equisolid", "equisold", "there is no projection 'equisold'"),
+            ("equisolid", "equisold", "unknown projection 'equisold'"),
             (
                 "radial5",
                 "radial7",
                 "terms_px has 2 numbers, radial7 has 3",
             ),
-            ("[1e-10", "[-1e-10", "covariance is not that of"),
+            ("[1e-10", "[-1e-10", "covariance is not a valid"),
             ("mirrored = true", "mirrored = 1", "line 4"),
             ("radius_px = 640.0", "radius = 640.0", "unknown field"),
             ("= 700.1", "= 7e8", "the focal length is 7e8 px"),
-            ("[-12.5", "[-400.0", "the distortion folds the picture"),
+            ("[-12.5", "[-400.0", "the distortion is not monotonic"),
         ] {
             assert!(text.contains(from), "{from}: {text}");
             let error = parse(Path::new("a.toml"), &text.replace(from, to)).unwrap_err();

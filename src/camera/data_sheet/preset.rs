@@ -52,7 +52,10 @@ impl Preset {
             Self::Experiment1 => {
                 "shipboard star sensor, 160 mm f/1.6 (Tong, Li & Wang 2014), 0.04 s at the zenith"
             }
-            Self::Experiment2 => "the same, 0.1 s at a zenith distance of 45°",
+            Self::Experiment2 => {
+                "shipboard star sensor, 160 mm f/1.6 (Tong, Li & Wang 2014), 0.1 s at a zenith distance of \
+                 45°"
+            }
             Self::NanosatTracker => {
                 "star tracker for small satellites: MT9P031 (2592 × 1944, 2.2 µm), 16 mm f/1.2"
             }

@@ -41,7 +41,7 @@ pub enum ResponseError {
         limit: u64,
     },
     /// A row does not hold two valid numbers.
-    #[error("{}, line {line}: '{}' where {expected} was expected", path.display(), excerpt(.found))]
+    #[error("{}, line {line}: found '{}', expected {expected}", path.display(), excerpt(.found))]
     Value {
         /// The file.
         path: PathBuf,

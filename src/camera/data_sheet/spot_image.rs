@@ -83,7 +83,7 @@ impl SpotImage {
                 let field = field.trim();
                 let value = field.parse::<f64>().ok();
                 let value = value.filter(|value| value.is_finite() && *value >= 0.0);
-                let expected = || "a number from 0 on".to_owned();
+                let expected = || "a number of 0 or more".to_owned();
                 samples.push(value.ok_or_else(|| wrong(format!("'{field}'"), expected()))?);
             }
             let found = samples.len() - before;
@@ -199,7 +199,7 @@ mod tests {
         for (text, expected) in [
             (
                 "1,2\n1,x\n",
-                "line 2: found 'x', expected a number from 0 on",
+                "line 2: found 'x', expected a number of 0 or more",
             ),
             ("1,2\n-1,2\n", "line 2: found '-1'"),
             (

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 /// Writes a `camera.toml` with the values of `preset` and a comment on each.
 pub fn template(preset: Preset) -> String {
     let sheet = preset.data_sheet();
-    let mut text = format!("# A camera for starpipe: {}\n", preset.about());
+    let mut text = format!("# Camera description for starpipe: {}\n", preset.about());
     for line in preset.sources().lines() {
         let _ = writeln!(text, "# {line}");
     }
@@ -34,7 +34,7 @@ pub fn template(preset: Preset) -> String {
 /// The optional keys, commented out, with their default values.
 fn imperfections(sheet: &DataSheet) -> String {
     let mut text =
-        "\n# Optional properties, which affect simulated frames (vignetting predictions, too):\n"
+        "\n# Optional properties. They affect simulated frames; vignetting also affects predictions.\n"
             .to_owned();
     let forms = SpotForm::ALL.map(|form| format!("{:?}", form.name()));
     let projections = Projection::ALL.map(|projection| format!("{:?}", projection.name()));

@@ -23,7 +23,7 @@ pub enum FormatError {
         expected_px: f64,
     },
     /// The format is not for such cameras.
-    #[error("{format} is for {expected}; this {found}")]
+    #[error("{format} only supports {expected}; this {found}")]
     Unsuitable {
         /// The format.
         format: &'static str,
@@ -52,7 +52,7 @@ pub enum FormatError {
     #[error(transparent)]
     Implausible(#[from] ImplausibleLens),
     /// An entry is missing.
-    #[error("there is no '{key}'; expected {expected}")]
+    #[error("'{key}' is missing; expected {expected}")]
     Missing {
         /// The name of the entry.
         key: &'static str,

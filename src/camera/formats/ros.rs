@@ -37,7 +37,7 @@ pub fn ros_camera_info(camera: &CameraModel, camera_name: &str) -> Result<String
     if let Some(largest_px) = lens.largest_px {
         let _ = writeln!(
             text,
-            "# Fitted; largest error on the frame: {largest_px:.4} px."
+            "# Fitted to the measured lens; largest error on the frame: {largest_px:.4} px."
         );
     }
     let _ = writeln!(text, "image_width: {}", camera.width_px);

@@ -244,7 +244,7 @@ mod tests {
             ),
             (
                 "n: 1",
-                "there is no 'm'; expected a matrix with rows, cols and data",
+                "'m' is missing; expected a matrix with rows, cols and data",
             ),
         ] {
             let error = Document::read(text).and_then(|document| document.matrix(&["m"]));

@@ -52,7 +52,7 @@ impl CompactHeader {
             return invalid(bytes.len(), "the end of the file", "a header of 36 bytes");
         };
         if !header.starts_with(&MAGIC) {
-            let expected = format!("the mark {}", quoted(&MAGIC));
+            let expected = format!("the signature {}", quoted(&MAGIC));
             return invalid(0, quoted(&header[..MAGIC.len()]), expected);
         }
         let mut input = ByteReader {
@@ -182,7 +182,7 @@ fn decode_names(
             return invalid(
                 input.at,
                 "the end of the names",
-                format!("{length} bytes more"),
+                format!("{length} more bytes"),
             );
         }
         names.push(StarName {

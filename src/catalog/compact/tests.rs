@@ -64,7 +64,7 @@ fn each_kind_of_damage_has_its_message() {
     expect_error(&sealed(with(ras + 3, 0xff)), "a position on the sphere");
     expect_error(&sealed(with(vs + 1, 0x7f)), "out of order");
     expect_error(&sealed(with(flags + 4, 200)), "ascending indices");
-    expect_error(&sealed(with(flags + 8, 200)), "bytes more");
+    expect_error(&sealed(with(flags + 8, 200)), "more bytes");
     expect_error(&sealed(with(flags + 8, 2)), "text after the last name");
     expect_error(&sealed(with(flags + 9, 0xff)), "a name in UTF-8");
 }

@@ -178,7 +178,7 @@ impl<R: BufRead> ImportRows<R> {
 
     /// Ends reading with an error.
     fn refuse(&mut self, found: &str) -> Option<RowRange> {
-        let message = format!("found {found}, which no catalog has");
+        let message = format!("found {found}, more than any catalog has");
         self.error = Some(io::Error::new(ErrorKind::InvalidData, message));
         self.ended = true;
         self.next_byte = self.buffer.len();

@@ -136,8 +136,8 @@ impl Sky2000Record<'_> {
         let motion = both_or_neither(
             self.decimal(StarColumn::PmRa, 5, "seconds of time a year, in 0.00001 s")?,
             self.decimal(StarColumn::PmDec, 4, "arcseconds a year, in 0.0001\"")?,
-            || self.error(StarColumn::PmRa, "a value, as pmDE has one"),
-            || self.error(StarColumn::PmDec, "a value, as pmRA has one"),
+            || self.error(StarColumn::PmRa, "a value, because pmDE has one"),
+            || self.error(StarColumn::PmDec, "a value, because pmRA has one"),
         )?;
         let Some((ra, dec)) = motion else {
             return Ok(None);

@@ -176,16 +176,16 @@ impl RowParser for CatalogTable {
         };
         if tally.exceeds_limit() && look_swapped(tally) {
             return Some(
-                "declinations beyond the poles, and no right ascension beyond them: the columns \
-                 of right ascension and declination seem to be swapped, or their headings are"
+                "some declinations are beyond ±90°, but no right ascensions are: the columns of right \
+                 ascension and declination, or their headings, seem to be swapped"
                     .to_owned(),
             );
         }
         let in_hours = columns.has_decimal_degrees() && look_like_hours(&tally.stars);
         in_hours.then(|| {
-            "all right ascensions lie between 0 and 24, while the declinations cover the sky: \
-             they are hours and not degrees; name the column ra_hours (if they are degrees after \
-             all, write them in radians, as ra_rad, or as hh:mm:ss)"
+            "all right ascensions are between 0 and 24, but the declinations cover the sky: the right \
+             ascensions seem to be in hours, not degrees; rename the column to ra_hours (if they really are \
+             in degrees, convert them to radians, in a column ra_rad, or to hh:mm:ss)"
                 .to_owned()
         })
     }

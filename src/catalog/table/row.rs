@@ -110,7 +110,8 @@ impl GeneralRow<'_> {
     /// A star that has only a name.
     fn named(&self, name: String) -> Parsed<(StarId, Option<String>)> {
         let line = u32::try_from(self.line);
-        let line = line.map_err(|_| self.error(self.columns.id.cells[0], "fewer lines"))?;
+        let line =
+            line.map_err(|_| self.error(self.columns.id.cells[0], "at most 4294967295 lines"))?;
         Ok((StarId::Named(line), Some(truncated(name))))
     }
 
@@ -121,8 +122,13 @@ impl GeneralRow<'_> {
         let position = both_or_neither(
             self.angle(ra, HeadingUnit::Hours)?,
             self.angle(dec, HeadingUnit::Degrees)?,
-            || self.error(ra.cell, "a right ascension, as there is a declination"),
-            || self.error(dec.cell, "a declination, as there is a right ascension"),
+            || self.error(ra.cell, "a right ascension, because there is a declination"),
+            || {
+                self.error(
+                    dec.cell,
+                    "a declination, because there is a right ascension",
+                )
+            },
         )?;
         let Some((ra_deg, dec_deg)) = position else {
             return Ok(None);

@@ -45,7 +45,7 @@ pub(super) const SUPPLEMENT_HIP: Tycho2Field = field(17, "HIP");
 
 const MAIN: Tycho2Layout = Tycho2Layout {
     field_count: 32,
-    expected_fields: "32 fields between bars",
+    expected_fields: "32 fields separated by |",
     ra: field(2, "RAmdeg"),
     dec: field(3, "DEmdeg"),
     bt: field(17, "BTmag"),
@@ -53,7 +53,7 @@ const MAIN: Tycho2Layout = Tycho2Layout {
 };
 const SUPPLEMENT: Tycho2Layout = Tycho2Layout {
     field_count: 18,
-    expected_fields: "18 fields between bars",
+    expected_fields: "18 fields separated by |",
     ra: field(2, "RAdeg"),
     dec: field(3, "DEdeg"),
     bt: field(11, "BTmag"),

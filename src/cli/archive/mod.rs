@@ -100,7 +100,8 @@ fn tell_status(arguments: &StatusArgs) -> Result<CommandOutput, CommandError> {
 
 fn status_text(status: &ArchiveStatus) -> String {
     let mut text = format!(
-        "parts      {} of {}\nfiles      {} of {}\nframes     {}: {} identified, {} not identified, {} unread\n",
+        "parts      {} of {}\nfiles      {} of {}\n\
+         frames     {}: {} identified, {} not identified, {} unreadable\n",
         status.parts_done,
         status.parts,
         status.files_done,
@@ -117,16 +118,16 @@ fn status_text(status: &ArchiveStatus) -> String {
         let parts = ranges(&status.damaged_parts);
         let _ = writeln!(
             text,
-            "damaged    parts {parts}, which the same `process` command writes again"
+            "damaged    parts {parts}; repeat the same `process` command to rewrite them"
         );
     }
     for unread in status.unread.iter().take(UNREAD_SHOWN) {
         let (frame, reason) = (printable(&unread.frame), printable(&unread.reason));
-        let _ = writeln!(text, "unread     {frame}: {reason}");
+        let _ = writeln!(text, "unreadable {frame}: {reason}");
     }
     if status.unread.len() > UNREAD_SHOWN {
         let more = status.unread.len() - UNREAD_SHOWN;
-        let _ = writeln!(text, "unread     {more} more, which --format csv lists");
+        let _ = writeln!(text, "unreadable {more} more, listed by --format csv");
     }
     text
 }

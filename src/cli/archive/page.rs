@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 const MAX_POINTS: usize = 400;
 
 const NO_PICTURES: &str =
-    "There are no pictures of the frames that failed: none of them can be read where it was.";
+    "There are no pictures of failed frames: no file can be read at its original path.";
 
 /// The page of the frames and nights of an archive.
 pub(super) fn build(archive: &Archive, nights: &[CameraNight]) -> anyhow::Result<PageContent> {
@@ -118,10 +118,10 @@ fn facts(frames: &[FrameSummary], nights: &[CameraNight]) -> Vec<Fact> {
             facts.push(Fact::new(name, text));
         }
     };
-    add("Half of the stars are detected at V", "", |f| {
-        f.limit50_vmag
+    add("50 % detection limit (V)", "", |f| f.limit50_vmag);
+    add("Predicted 50 % detection limit (V)", "", |f| {
+        f.predicted_limit50_vmag
     });
-    add("Predicted", "", |f| f.predicted_limit50_vmag);
     add("Measured minus predicted", " mag", |f| {
         f.limit_difference_mag
     });
@@ -197,7 +197,7 @@ fn limits(frames: &[FrameSummary]) -> Vec<PageFigure> {
         ));
     }
     let panel = Panel {
-        title: "Half of the stars are found at".to_owned(),
+        title: "50 % detection limit".to_owned(),
         x: Axis {
             spacing: Spacing::Time,
             ..Axis::new("UTC")
@@ -229,8 +229,8 @@ fn provenance(archive: &Archive) -> anyhow::Result<Vec<Fact>> {
         .collect();
     Ok(vec![
         options(),
-        Fact::new("Tables by starpipe", text(&identity["version"])),
+        Fact::new("Tables written by starpipe", text(&identity["version"])),
         Fact::new("Catalog", text(&configuration["catalog"]["title"])),
-        Fact::new("Options of the frames", settings.join(", ")),
+        Fact::new("Processing options", settings.join(", ")),
     ])
 }

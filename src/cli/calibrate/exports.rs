@@ -10,7 +10,7 @@ use starpipe::identify::lens::LensCalibration;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Files of other programs")]
+#[command(next_help_heading = "Files for other programs")]
 pub(super) struct ExportOptions {
     /// Write the lens as camera matrix and distortion of OpenCV, for cv or cv::fisheye
     #[arg(long, value_name = "FILE.yaml")]
@@ -18,11 +18,11 @@ pub(super) struct ExportOptions {
     /// Write the lens as ROS camera_info
     #[arg(long, value_name = "FILE.yaml")]
     ros: Option<PathBuf>,
-    /// Write the lens and the pointing of the first frame as a platepar of RMS; needs --site and a
-    /// date with its time
+    /// Write the lens and the pointing of the first frame as an RMS platepar; needs --site and a
+    /// date with time of day
     #[arg(long, value_name = "FILE.cal")]
     platepar: Option<PathBuf>,
-    /// Write the same as settings of indi-allsky
+    /// Write the lens and the pointing of the first frame as settings for indi-allsky
     #[arg(long, value_name = "FILE.json")]
     indi_allsky: Option<PathBuf>,
 }
@@ -40,7 +40,7 @@ impl ExportOptions {
         let pointing = || {
             let pointings = measured.frames.iter().map(|frame| frame.pointing);
             let known: Option<Pointing> = pointings.flatten().next();
-            known.ok_or_else(|| anyhow!("no frame has both a site and a date with time"))
+            known.ok_or_else(|| anyhow!("no frame has both a site and a date with time of day"))
         };
         let mut files = Vec::new();
         let mut add = |path: &Option<PathBuf>, text: &dyn Fn() -> anyhow::Result<String>| {

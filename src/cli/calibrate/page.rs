@@ -33,7 +33,7 @@ pub(super) fn build(
     Ok(PageContent {
         title: "The lens of a camera".to_owned(),
         question: format!(
-            "Which lens made {} of {} × {} px?",
+            "What are the properties of the lens in these {} of {} × {} px?",
             counted(report.frames.len() + report.left_out.len(), "frame"),
             report.width,
             report.height
@@ -87,7 +87,8 @@ fn notes(report: &LensReport, unread: usize) -> Vec<String> {
     }
     if report.coverage < ENOUGH_COVERAGE {
         notes.push(format!(
-            "Only {:.0} % of the frame has stars; elsewhere the lens is less well known. Frames with stars there help.",
+            "Only {:.0} % of the frame has stars; elsewhere the lens model is less accurate. \
+             Add frames with stars there.",
             100.0 * report.coverage
         ));
     }

@@ -38,7 +38,7 @@ fn master_dark(darks: &Darks, group: &ExposureGroup) -> anyhow::Result<Vec<u8>> 
     }
     header.real("MEAN", group.level_adu, "[ADU] mean of the frames' means");
     let noise = group.temporal_noise_adu.unwrap_or(f64::NAN);
-    header.real("NOISE", noise, "[ADU] of a pixel in one frame");
+    header.real("NOISE", noise, "[ADU] noise of a pixel in one frame");
     header.history(&format!(
         "Mean of each pixel over {} frames, by starpipe darks {}",
         group.frames,

@@ -37,11 +37,11 @@ pub(crate) struct DarksArgs {
     frames: FrameOptions,
     #[command(flatten)]
     page: PageOption,
-    /// Exposure in seconds, of one file or directory, else of all frames (may be repeated)
+    /// Exposure in seconds, of one file or directory if PATH is given, else of all frames (may be repeated)
     /// [default: the exposure in the file's header]
     #[arg(long, value_name = "SECONDS[:PATH]", allow_hyphen_values = true)]
     exposure: Vec<ExposureOf>,
-    /// Bits of a gray level [default: those of --camera, else of the file's format]
+    /// Bit depth [default: that of --camera, else of the file's format]
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=32))]
     bits: Option<u32>,
     /// Description of the camera, see `starpipe camera new`: its gain converts gray levels to
@@ -155,7 +155,7 @@ fn check_exposures(exposures: &[ExposureOf], frames: &[PathBuf]) -> Result<(), C
     for path in exposures.iter().filter_map(|e| e.path.as_ref()) {
         if !frames.iter().any(|frame| frame.starts_with(path)) {
             return Err(CommandError::Usage(format!(
-                "--exposure names {}, but no frame of it is given",
+                "--exposure gives the exposure of {}, but no frame in it is processed",
                 path.display()
             )));
         }

@@ -45,7 +45,7 @@ pub(super) fn build(darks: &Darks, unread: usize) -> anyhow::Result<PageContent>
         text: report.to_text(),
         figures,
         tables,
-        provenance: vec![page::options(), Fact::new("Full scale by", full_scale)],
+        provenance: vec![page::options(), Fact::new("Full scale from", full_scale)],
         ..PageContent::default()
     })
 }
@@ -56,7 +56,7 @@ fn answer(report: &DarksReport) -> String {
         (Some(adu), Some(e)) => parts.push(format!("a read noise of {adu:.3} ADU ({e:.3} e)")),
         (Some(adu), None) => parts.push(format!("a read noise of {adu:.3} ADU")),
         _ => parts.push(format!(
-            "a deviation of {:.3} ADU in a frame",
+            "a standard deviation of {:.3} ADU within a frame",
             report.sigma_adu
         )),
     }
@@ -87,7 +87,7 @@ fn answer(report: &DarksReport) -> String {
 fn notes(report: &DarksReport, unread: usize) -> Vec<String> {
     let mut notes = report.warnings.clone();
     let missing = report.missing_texts();
-    notes.extend(missing.map(|missing| format!("Not known: {missing}.")));
+    notes.extend(missing.map(|missing| format!("Not measured: {missing}.")));
     if unread > 0 {
         notes.push(format!("{} could not be read.", counted(unread, "file")));
     }

@@ -18,7 +18,9 @@ use std::path::PathBuf;
     starpipe defocus --normalisation peak --count 1000 --out defocus\n\n\
     The radius is the standard deviation of the spot. The error is the root mean square distance \
     between centroid and truth. --normalisation peak repeats the experiment of Wang et al., Laser & \
-    Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With energy all spots have the total light of the star. The two have different answers.\n\n\
+    Optoelectronics Progress 56, 101101 (2019): all spots have the same brightest pixel. With \
+    --normalisation energy, all spots have the same total light. The best radius is different in the two \
+    cases.\n\n\
     Exit status: 0 done, 1 something could not be read or written, 2 the command line is wrong,\n\
     3 no radius meets a required error.")]
 pub(crate) struct DefocusArgs {
@@ -27,41 +29,41 @@ pub(crate) struct DefocusArgs {
     pub(super) normalisation: Option<Normalisation>,
     #[command(flatten)]
     pub(super) scenario: ScenarioOptions,
-    /// Johnson V of the star, or several with commas; energy only [default: 1.5 brighter than the
-    /// camera's limit]
+    /// Johnson V of the star, or several separated by commas; energy only [default: 1.5 mag brighter
+    /// than the camera's limit]
     #[arg(long, value_name = "V[,V...]", value_delimiter = ',', value_parser = values::finite, allow_hyphen_values = true)]
     pub(super) vmag: Vec<f64>,
-    /// Required error in pixels, or several with commas: report the radii that meet it
+    /// Required error in pixels, or several separated by commas: report the radii that meet it
     #[arg(long, value_name = "PX[,PX...]", value_delimiter = ',', value_parser = values::positive, allow_hyphen_values = true)]
     pub(super) required_error: Vec<f64>,
     /// Measure the noise on dark frames: files, directories, or patterns such as 'darks/*.tif'
     #[arg(long, value_name = "FRAME", num_args = 1..)]
     pub(super) darks: Vec<PathBuf>,
-    /// Noise for which radii are reported, as a part of full scale; peak only [default: that of
+    /// Noise for which radii are reported, as a fraction of full scale; peak only [default: that of
     /// --darks, else the paper's 9.32e-4]
     #[arg(long, value_name = "NUMBER", value_parser = values::positive, allow_hyphen_values = true, conflicts_with = "darks")]
     pub(super) at_noise: Option<f64>,
-    /// Radii: standard deviations of the spot, in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45
+    /// Spot radii (standard deviations), in pixels [default: 0.4:2.4:200 for peak, 0.2:2.4:45
     /// for energy]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = radii, allow_hyphen_values = true)]
     pub(super) radius_px: Option<Range>,
-    /// Noises as parts of full scale; peak only [default: 2e-4:20e-4:100]
+    /// Noise levels as fractions of full scale; peak only [default: 2e-4:20e-4:100]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true)]
     pub(super) noise_relative: Option<Range>,
-    /// Noises of a pixel without light, in electrons; energy only [default: nine from a quarter to
-    /// four times the camera's]
+    /// Noise levels of a dark pixel, in electrons; energy only [default: nine levels, from 1/4 to 4
+    /// times the camera's]
     #[arg(long, value_name = "FROM:TO:COUNT[:log]", value_parser = range, allow_hyphen_values = true, conflicts_with = "noise_relative")]
     pub(super) noise_e: Option<Range>,
-    /// Stars at each point of the grid [default: 20 for peak, as the paper has it, 400 for energy]
+    /// Stars at each point of the grid [default: 20 for peak, as in the paper, 400 for energy]
     #[arg(long, alias = "trials", value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) count: Option<u32>,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Brightest pixel of a spot centered on it, as a part of full scale; peak only [default: 0.675]
+    /// Peak of a spot centered on a pixel, as a fraction of full scale; peak only [default: 0.675]
     #[arg(long, value_name = "PART", value_parser = values::share, allow_hyphen_values = true)]
     pub(super) peak: Option<f64>,
-    /// Pixels from the center of a fixed window to its edge
+    /// Half-width of the fixed window: pixels on each side of its central pixel
     #[arg(long, value_name = "PX", default_value_t = 7, value_parser = clap::value_parser!(u8).range(1..=15))]
     pub(super) half_window_px: u8,
     /// How to measure a star's position [default: fixed-window for peak, gaussian-fit for energy]

@@ -64,12 +64,10 @@ fn measure(
     let more = match &darks.warnings[..] {
         [] => return Ok(darks),
         [_] => String::new(),
-        [_, others @ ..] => format!("; {} more do not either", others.len()),
+        [_, others @ ..] => format!("; {} more warnings", others.len()),
     };
     let first = &darks.warnings[0];
-    Err(anyhow!(
-        "{first}{more}: the noise without light cannot be measured"
-    ))
+    Err(anyhow!("{first}{more}: the dark noise cannot be measured"))
 }
 
 /// The files that paths, directories and patterns stand for.

@@ -56,7 +56,7 @@ pub(super) fn sheets(report: &DefocusReport, studies: &[StarStudy]) -> Vec<(&'st
 fn noise_axis(report: &DefocusReport) -> Axis {
     let [from, to] = report.noises;
     let axis = match report.noise_unit {
-        "e" => Axis::log("noise of a pixel in the dark (e)", true),
+        "e" => Axis::log("noise of a dark pixel (e)", true),
         unit => Axis::new(format!("noise ({unit})")),
     };
     axis.within(from, to)
@@ -104,7 +104,7 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
         let paper = study.isolines.iter();
         let paper = paper.map(|line| paper_line(study, line.rms_px)).collect();
         layers.push(PlotLayer::new(
-            "the paper's surface",
+            "surface of the paper",
             Rgb::ORANGE,
             Marks::Lines(paper),
         ));
@@ -112,7 +112,7 @@ fn errors(report: &DefocusReport, study: &StarStudy) -> Panel {
     layers.push(PlotLayer::unnamed(Rgb::PAPER, Marks::Lines(lines)));
     layers.push(PlotLayer::unnamed(Rgb::BLACK, labels));
     Panel {
-        title: title_of(study, "error of a centroid, with lines of equal error"),
+        title: title_of(study, "centroid error, with contours"),
         x: noise_axis(report),
         y: radius_axis(report),
         layers,
@@ -170,7 +170,7 @@ fn of_paper(report: &DefocusReport, study: &StarStudy) -> Vec<(&'static str, She
     };
     let spots = PAPER_SPOTS_PX.map(|spot_px| spot(experiment, spot_px));
     let (own, paper) = (study.surface.as_ref().ok(), Surface::of_paper());
-    let surfaces = [("ours", own), ("the paper's", Some(&paper))].into_iter();
+    let surfaces = [("this run", own), ("paper", Some(&paper))].into_iter();
     let surfaces =
         surfaces.filter_map(|(whose, surface)| Some(fitted(report, study, whose, surface?)));
     vec![
@@ -321,7 +321,7 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
         Panel {
             title: title_of(
                 study,
-                &format!("over the radius; dots: own noise, gray: its {guide}"),
+                &format!("error versus radius; dots: at the given noise, gray: {guide}"),
             ),
             x: radius_axis(report),
             y: error(),
@@ -329,7 +329,7 @@ fn sections(report: &DefocusReport, study: &StarStudy) -> [Panel; 2] {
             ..Panel::default()
         },
         Panel {
-            title: title_of(study, "over the noise, at four radii"),
+            title: title_of(study, "error versus noise, at four radii"),
             x: noise_axis(report),
             y: error(),
             layers: over_noise(study),
@@ -410,7 +410,7 @@ fn best_radii(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLORS);
     let layers = stars.map(|(star, color)| PlotLayer::new(label_of(star), color, best_of(star)));
     Panel {
-        title: "Best radius, and those whose error is at most 5 % larger".to_owned(),
+        title: "Best radius, and radii with at most 5 % more error".to_owned(),
         x: noise_axis(report),
         y: Axis::new("radius (px)"),
         layers: layers.collect(),
@@ -430,14 +430,18 @@ fn radii_for_errors(report: &DefocusReport, star: &DefocusStarReport, study: &St
     let parabolas = Marks::Lines(parabolas.collect());
     let labels = line_labels(study, &lines, |line| line.len() * 2 / 3);
     Panel {
-        title: title_of(study, "radius over the noise"),
+        title: title_of(study, "radius versus noise"),
         x: noise_axis(report),
         y: radius_axis(report),
         layers: vec![
-            PlotLayer::new("best, to 5 % of its error", Rgb::BLUE, best_of(star)),
+            PlotLayer::new(
+                "best, and range with up to 5 % more error",
+                Rgb::BLUE,
+                best_of(star),
+            ),
             PlotLayer::new("parabolas", Rgb::GREY, parabolas),
             PlotLayer::new(
-                "smallest for an error (px)",
+                "smallest that meets an error (px)",
                 Rgb::ORANGE,
                 Marks::Lines(lines),
             ),
@@ -452,8 +456,8 @@ fn accuracy_and_reach(report: &DefocusReport) -> Panel {
     let stars = report.stars.iter().zip(COLORS);
     Panel {
         title: "Centroid error and limit; numbers: radius (px), gray: Cramér-Rao bound".to_owned(),
-        x: Axis::new("half of the stars are found at V"),
-        y: Axis::log("error of the centroid (px)", true),
+        x: Axis::new("50 % detection limit (V)"),
+        y: Axis::log("centroid error (px)", true),
         layers: stars
             .flat_map(|(star, color)| accuracy_of(star, color))
             .collect(),

@@ -8,6 +8,10 @@ use starpipe::base::format::five_digits;
 use starpipe::lab::spot_radius::{DefocusReport, DefocusStarReport, StarStudy};
 use starpipe::report::page::{Fact, PageContent, PageFigure};
 
+/// A note if no radius on one side of the best one was tried.
+const AT_EDGE: &str = "The best radius is at an end of the range: a better one may lie outside. \
+    Widen the range with --radius-px.";
+
 /// The page of the results; `notes` are what was warned of.
 pub(super) fn build(
     arguments: &DefocusArgs,
@@ -28,7 +32,7 @@ pub(super) fn build(
         notes.push(plan::chosen_for_you(*v_mag));
     }
     if stars.iter().any(|star| star.best.is_at_edge) {
-        notes.push("The best radius is the first or the last that was tried: a better one may lie beyond. --radius-px tries others.".to_owned());
+        notes.push(AT_EDGE.to_owned());
     }
     let heading = report.heading_text();
     let assumed: Vec<&str> = heading.lines().collect();
@@ -40,7 +44,7 @@ pub(super) fn build(
         .map(|(name, sheet)| figure(sheet, caption(name)))
         .collect();
     Ok(PageContent {
-        title: "Radius of the spot for the best centroids".to_owned(),
+        title: "Spot radius with the smallest centroid error".to_owned(),
         question: format!(
             "Which spot radius has the smallest centroid error? {} radii from {} to {} px.",
             report.radii,
@@ -52,7 +56,7 @@ pub(super) fn build(
         notes,
         text: report.to_text(),
         figures: drawn,
-        tables: vec![table("Errors over the radius", &curve_table(report)?)?],
+        tables: vec![table("Error versus radius", &curve_table(report)?)?],
         provenance: vec![
             options(),
             Fact::new("Seed", report.seed.to_string()),
@@ -70,7 +74,7 @@ fn name_of(star: &DefocusStarReport) -> String {
 fn answer(star: &DefocusStarReport) -> String {
     let [from, to] = star.best.nearly_px;
     format!(
-        "{}{:.2} px, where the error is {:.4} px. From {from:.2} to {to:.2} px it is at most 5 % more.",
+        "{}{:.2} px, with an error of {:.4} px. From {from:.2} to {to:.2} px it is at most 5 % larger.",
         name_of(star),
         star.best.radius.radius_px,
         star.best.radius.error_px
@@ -86,12 +90,12 @@ fn facts(report: &DefocusReport, star: &DefocusStarReport) -> Vec<Fact> {
 
 fn caption(name: &str) -> &'static str {
     match name {
-        "errors" => "Error of the centroid over noise and radius, with lines of equal error",
-        "sections" => "The same at a few noises and at a few radii",
+        "errors" => "Centroid error versus noise and radius, with contours",
+        "sections" => "Centroid error at four noise levels and at four radii",
         "best-radius" => "Best radius as a function of the noise",
         "accuracy-and-reach" => "Trade-off: centroid error against limiting magnitude",
         "spots" => "Spots of the paper's figure 1",
-        "surface" => "The surface through the errors (eq. 13), ours and the paper's",
+        "surface" => "Surface fitted to the errors (eq. 13): this run and the paper",
         _ => "The error if pixels are sampled at their centers",
     }
 }

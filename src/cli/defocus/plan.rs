@@ -118,7 +118,7 @@ fn energy(
 
 fn chosen_v_mag(scenario: &Scenario) -> Result<f64, Error> {
     let v_mag = default_v_mag(scenario).map_err(|error| match error {
-        DefocusError::NoLimit => anyhow!("{error}; --vmag gives one"),
+        DefocusError::NoLimit => anyhow!("{error}; give one with --vmag"),
         other => other.into(),
     })?;
     report_warning(chosen_for_you(v_mag));
@@ -128,7 +128,7 @@ fn chosen_v_mag(scenario: &Scenario) -> Result<f64, Error> {
 /// What is said of a star that nobody chose.
 pub(super) fn chosen_for_you(v_mag: f64) -> String {
     format!(
-        "no --vmag: the star has V {v_mag}, about {BRIGHTER_THAN_LIMIT_MAG} brighter than the camera's limit"
+        "no --vmag: the star has V {v_mag}, about {BRIGHTER_THAN_LIMIT_MAG} mag brighter than the camera's limit"
     )
 }
 
@@ -136,9 +136,9 @@ pub(super) fn chosen_for_you(v_mag: f64) -> String {
 fn with_advice(error: NoiseError) -> Error {
     match error {
         NoiseError::NoRelativeNoise => {
-            anyhow!("{error}; --camera gives the bits of a gray level")
+            anyhow!("{error}; give the bit depth with --camera")
         }
-        NoiseError::Zero => anyhow!("{error}: --read-noise-e or --darks gives it"),
+        NoiseError::Zero => anyhow!("{error}: give the noise with --read-noise-e or --darks"),
         other => other.into(),
     }
 }
@@ -169,10 +169,7 @@ fn check(
     let of_energy = [
         (!arguments.vmag.is_empty(), "--vmag"),
         (arguments.noise_e.is_some(), "--noise-e"),
-        (
-            has_other_centroid,
-            "a centroid other than that of a fixed window",
-        ),
+        (has_other_centroid, "a --centroid other than fixed-window"),
     ];
     let (refused, other) = match normalisation {
         Normalisation::Energy => (of_peak, "peak"),

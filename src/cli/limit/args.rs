@@ -18,15 +18,16 @@ use std::str::FromStr;
     starpipe limit --preset imx174-35mm --sweep exposure_s=0.01:10:31:log\n  \
     starpipe limit --preset imx174-35mm --html=limit.html\n  \
     starpipe limit --figures figures\n\n\
-    The limit is that of the paper: the signal of the star's brightest pixel is --snr times its noise.\n\
+    The limit is that of Tong, Li & Wang (2014): the signal of the star's brightest pixel is --snr times\n\
+    its noise.\n\
     Every number of the camera and of the conditions has an option; docs/sensitivity.md has the\n\
     equations.")]
 #[command(group = ArgGroup::new("scenario").args(["camera", "preset", "figures"]).required(true).multiple(true))]
 pub(crate) struct LimitArgs {
     #[command(flatten)]
     pub(crate) scenario: ScenarioOptions,
-    /// Repeat the prediction over one parameter, named as its option with _ or - (may be repeated);
-    /// :log spaces the values by even ratios
+    /// Repeat the prediction for several values of a parameter, named like its option with _ or -
+    /// (may be repeated); :log spaces the values logarithmically
     #[arg(
         long,
         value_name = "NAME=FROM:TO:COUNT[:log]",
@@ -37,7 +38,7 @@ pub(crate) struct LimitArgs {
     #[arg(long, value_enum, default_value_t = OutputFormat::Text)]
     pub(crate) format: OutputFormat,
     /// Also draw the sweeps into this file, a panel for each, with a second curve for 12.5 times
-    /// the exposure (in a sweep over the exposure: for half the aperture)
+    /// the exposure (for half the aperture in a sweep of the exposure)
     #[arg(long, value_name = "FILE.svg|png", value_parser = PlotFile::parser(), requires = "sweep")]
     pub(crate) plot: Option<PlotFile>,
     /// Draw the eleven figures of the paper into this directory, for exposures of 0.04 s and 0.5 s

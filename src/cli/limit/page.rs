@@ -10,8 +10,7 @@ use starpipe::catalog::Catalog;
 use starpipe::predict::{Parameter, PredictionRow, Reading, Scenario, Spacing, Sweep};
 use starpipe::report::page::{Fact, PageContent};
 
-const PAPER: &str =
-    "The equations are used as the paper's authors did. --reading physical corrects the physics.";
+const PAPER: &str = "The equations are used as by the authors of the paper. --reading physical corrects errors in them.";
 /// What a prediction alone is swept over in the figures of its page.
 const SWEPT: [&str; 2] = ["exposure_s", "aperture_mm"];
 /// Its values go from this part to this multiple of the scenario's.
@@ -49,7 +48,7 @@ pub(super) fn build(
         }
         // The values of a sweep may have limits that the camera as it is does not have.
         Err(error) => {
-            page.answer = format!("Without the sweep there is no limit: {error}");
+            page.answer = format!("The camera as described has no limit: {error}");
             None
         }
     };
@@ -69,7 +68,7 @@ pub(super) fn build(
             continue;
         };
         let caption = format!(
-            "The limit over {}; the dot is the camera as described",
+            "Limiting magnitude against {}; dot: the camera as described",
             sweep.parameter.title()
         );
         page.figures.push(figure(&sheet, &caption));
@@ -80,14 +79,14 @@ pub(super) fn build(
     }
     if let Some(row) = own {
         let csv = csv_table(row.budget_rows())?;
-        page.tables.push(table("Budget of the limit", &csv)?);
+        page.tables.push(table("Signal and noise budget", &csv)?);
     }
     Ok(page)
 }
 
 fn question(scenario: &Scenario) -> String {
     format!(
-        "Which is the faintest star that {} detects, with an exposure of {} s and an aperture of {} mm?",
+        "What is the faintest star that {} detects with an exposure of {} s and an aperture of {} mm?",
         scenario.camera.name,
         five_digits(scenario.conditions.exposure_s),
         five_digits(scenario.camera.aperture_mm)
@@ -97,15 +96,18 @@ fn question(scenario: &Scenario) -> String {
 fn answer(row: &PredictionRow) -> String {
     let prediction = &row.prediction;
     let limit = format!(
-        "V {:.2}: the brightest pixel of such a star has {} times the noise.",
+        "V {:.2}: for such a star, the brightest pixel has a signal-to-noise ratio of {}.",
         prediction.limit_vmag,
         five_digits(prediction.snr)
     );
     match prediction.detector.limit50_vmag {
         Some(found) => {
-            format!("{limit} starpipe's filter finds half of the stars of V {found:.2}.")
+            format!("{limit} starpipe's matched filter detects half of the stars of V {found:.2}.")
         }
-        None => limit + " starpipe's detector has no limit: noise is detected as often as stars.",
+        None => {
+            limit
+                + " starpipe's matched filter has no limiting magnitude: it detects noise as often as stars."
+        }
     }
 }
 
@@ -117,21 +119,27 @@ fn facts(row: &PredictionRow) -> Vec<Fact> {
         format!("V {:.2}", prediction.limit_vmag),
     )];
     for (name, limit) in [
-        ("Half are found at", prediction.detector.limit50_vmag),
-        ("Nine in ten are found at", prediction.detector.limit90_vmag),
+        (
+            "50 % of stars detected at",
+            prediction.detector.limit50_vmag,
+        ),
+        (
+            "90 % of stars detected at",
+            prediction.detector.limit90_vmag,
+        ),
     ] {
         facts.extend(limit.map(|v| Fact::new(name, format!("V {v:.2}"))));
     }
     if let Some(faintest) = &row.faintest {
         let value = format!("V {:.2} ± {:.2}", faintest.mean_vmag, faintest.sigma_mag);
-        facts.push(Fact::new("Faintest star to be expected in a field", value));
+        facts.push(Fact::new("Expected faintest star in a field", value));
         let found = five_digits((faintest.stars_found * 10.0).round() / 10.0);
-        facts.push(Fact::new("Stars found in a field", found));
+        facts.push(Fact::new("Stars detected in a field", found));
     }
     facts.extend([
-        Fact::new("Light of the star", e(prediction.star_e)),
-        Fact::new("Sky in a pixel", e(prediction.background_e)),
-        Fact::new("Noise", e(prediction.noise_e)),
+        Fact::new("Signal in the brightest pixel", e(prediction.star_e)),
+        Fact::new("Sky background per pixel", e(prediction.background_e)),
+        Fact::new("Noise of the brightest pixel", e(prediction.noise_e)),
         Fact::new("Airmass", five_digits(prediction.airmass)),
     ]);
     facts

@@ -18,9 +18,10 @@ use std::path::PathBuf;
     starpipe night --site 52.22,4.42 --dark master-dark.fits --out 2026-01-15 night/\n  \
     starpipe night --site 47.1,8.3,900 --camera camera.toml --utc-offset 1 --out results 'night/image-*.tif'\n\n\
     Frames are processed in the order of their dates. The lens and the orientation of the camera are measured\n\
-    in frames spread over the night, and then assumed to be constant. --out gets a line for each frame in\n\
-    night.jsonl, night.csv, night.parquet and night.dat (the zenith in the skyglow community's format), a\n\
-    summary in night.json, a figure in night.svg, and pixels that do not move with the sky in hot-pixels.csv.\n\
+    in frames spread over the night, and then assumed to be constant. The directory --out gets a line for\n\
+    each frame in night.jsonl, night.csv, night.parquet and night.dat (the zenith in the format of the\n\
+    skyglow community), a summary in night.json, a figure in night.svg, and the hot pixels in\n\
+    hot-pixels.csv.\n\
     The same command continues a run that was stopped.\n\n\
     Exit status: 0 all went well, 1 something could not be read or written, 2 the command line is wrong, 3 no\n\
     frame was identified.")]
@@ -41,7 +42,7 @@ pub(crate) struct NightArgs {
     /// Print errors only: no progress, no warnings, and no report unless --format is given
     #[arg(short, long)]
     pub(super) quiet: bool,
-    /// Ignore the hot pixels found in the frames of the night, which hot-pixels.csv lists
+    /// Ignore the hot pixels found in the frames of the night (those listed in hot-pixels.csv)
     #[arg(long, conflicts_with = "hot_pixels")]
     pub(super) mask_hot_pixels: bool,
     #[command(flatten)]

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 /// The summary as text.
 pub(super) fn text(night: &NightSummary) -> String {
     let mut text = format!(
-        "night      {} to {}: {}, {} identified, {} held, {} unread\n",
+        "night      {} to {}: {}, {} identified, {} with computed pointing, {} unreadable\n",
         or_dash(&night.first_date),
         or_dash(&night.last_date),
         counted(night.frames, "frame"),

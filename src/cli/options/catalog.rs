@@ -66,7 +66,7 @@ impl CatalogOptions {
             if let Some(reasons) = file.summary.left_out() {
                 let (path, records) = (file.path.display(), file.summary.records);
                 report_warning(format_args!(
-                    "{path}: not all of its {records} records are stars: {reasons}"
+                    "{path}: some of its {records} records are skipped: {reasons}"
                 ));
             }
         }

@@ -55,13 +55,13 @@ pub(crate) struct HintOptions {
     #[command(flatten)]
     #[serde(flatten)]
     observer: ObserverOptions,
-    /// Directions that the attitude refers to
+    /// Star directions that the attitude refers to
     #[arg(long, value_name = "DIRECTIONS", value_enum, default_value_t)]
     frame_of: AttitudeFrame,
     /// Description of the camera, see `starpipe camera new`. It gives the scale if no option does, and
     /// a predicted limiting magnitude if the exposure is known. If it has a lens measured by
-    /// `starpipe calibrate`, that lens is used. Also reads a lens of OpenCV or ROS (.yaml), or a platepar
-    /// of RMS (.cal)
+    /// `starpipe calibrate`, that lens is used. A lens of OpenCV or ROS (.yaml) and an RMS platepar
+    /// (.cal) are also accepted
     #[arg(long, value_name = "FILE")]
     #[serde(skip)]
     pub(crate) camera: Option<PathBuf>,

@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct ScenarioOptions {
-    /// Camera, as `starpipe camera new` writes one
+    /// Description of the camera, see `starpipe camera new`
     #[arg(long, value_name = "camera.toml", conflicts_with = "preset")]
     pub(crate) camera: Option<PathBuf>,
     /// A built-in camera with its observing conditions
     #[arg(long, value_name = "NAME", value_parser = preset())]
     pub(crate) preset: Option<Preset>,
-    /// Which equations [default: paper for the paper's two experiments, else physical]
+    /// Which form of the equations [default: paper for experiment-1 and experiment-2, else physical]
     #[arg(long, value_enum)]
     pub(crate) reading: Option<ReadingArg>,
     #[command(flatten)]
@@ -28,7 +28,7 @@ pub(crate) struct ScenarioOptions {
 pub(crate) enum ReadingArg {
     /// Equations (1) to (12) of Tong, Li & Wang 2014 as their authors used them
     Paper,
-    /// The same budget with the physical errors corrected
+    /// The same equations with physical errors corrected
     Physical,
 }
 

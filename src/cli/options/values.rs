@@ -42,7 +42,7 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     within(
         text,
-        "the part",
+        "the fraction",
         |v| v > 0.0 && v <= 1.0,
         "above 0 and at most 1",
     )
@@ -68,13 +68,18 @@ pub(crate) fn star_count(text: &str) -> Result<f64, String> {
 /// A part of something, in percent.
 pub(crate) fn part(text: &str) -> Result<f64, String> {
     let limits = "0 to 100 percent";
-    within(text, "the part", |v| (0.0..=100.0).contains(&v), limits)
+    within(
+        text,
+        "the percentage",
+        |v| (0.0..=100.0).contains(&v),
+        limits,
+    )
 }
 
 /// A multiple of something, in percent.
 pub(crate) fn multiple(text: &str) -> Result<f64, String> {
     let limits = "0 to 10000 percent";
-    within(text, "the multiple", |v| (0.0..=1e4).contains(&v), limits)
+    within(text, "the percentage", |v| (0.0..=1e4).contains(&v), limits)
 }
 
 /// A horizontal field of view in degrees.

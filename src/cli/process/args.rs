@@ -28,7 +28,7 @@ use std::path::PathBuf;
     The format of a file is recognized from its content. Files may be compressed with gzip or bzip2. Date,\n\
     exposure, pixel size and focal length are taken from FITS keywords or Exif unless an option gives them.\n\n\
     --out results writes results/night.json, night.csv, night.wcs and night.png for night.tif, and\n\
-    overwrites only its own results. In directories of frames, results are skipped.")]
+    overwrites only its own results. Result files in a directory of frames are not processed.")]
 pub(crate) struct ProcessArgs {
     /// Whether the sky is measured: `starpipe sky`.
     #[arg(skip)]
@@ -95,8 +95,8 @@ struct ConditionOptions {
         requires = "camera"
     )]
     zenith_distance: Option<String>,
-    /// With --camera, extinction in magnitudes per airmass [default: the law of the sensitivity
-    /// paper, 0.35 in V]
+    /// With --camera, extinction in magnitudes per airmass [default: 0.35 in V, with the wavelength
+    /// dependence of Tong, Li & Wang 2014]
     #[arg(
         long,
         value_name = "MAG",
@@ -114,7 +114,7 @@ pub(super) struct PartOptions {
     /// of names: .txt (one per line), .parquet, or - for standard input
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "format", "all_stars"])]
     pub(super) out_parquet: Option<PathBuf>,
-    /// Process only the parts of worker K of N, that is every Nth part
+    /// Process only the parts of worker K of N: every Nth part, starting with the Kth
     #[arg(long, value_name = "K/N", requires = "out_parquet")]
     pub(super) shard: Option<Shard>,
     /// Frames in each part

@@ -163,7 +163,7 @@ impl Counts {
             failed,
         } = self.frames;
         let mut text = format!(
-            "{}, {}: {identified} identified, {not_identified} not identified, {failed} unread",
+            "{}, {}: {identified} identified, {not_identified} not identified, {failed} unreadable",
             counted(self.parts, "part"),
             counted(identified + not_identified + failed, "frame"),
         );

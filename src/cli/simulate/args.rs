@@ -16,8 +16,9 @@ use std::path::PathBuf;
     starpipe simulate --preset nanosat-tracker --random-attitude --tumble-deg-s 0.3 --cosmic-rays-cm2-s 5 --out frames\n  \
     starpipe simulate --camera camera.toml --dark --count 20 --out darks\n  \
     starpipe simulate --camera camera.toml --stars list.csv --out field.fits\n\n\
-    Each frame has a table of what is on it, FRAME.csv: stars with their positions, magnitudes and electrons, false\n\
-    stars, trails, cosmic rays. The header of a FITS file or the description of a TIFF file lists all parameters.\n\
+    A table of what each frame contains is written to FRAME.csv: stars with their positions, magnitudes and\n\
+    electrons, false stars, trails, cosmic rays. The header of a FITS file or the description of a TIFF\n\
+    file lists all parameters.\n\
     With --date 2000-01-01T12:00:00Z, frame N of --random-attitude is frame N of `starpipe validate` with the
     same options and seed.")]
 #[command(group = ArgGroup::new("subject").args(["ra", "random_attitude", "stars", "dark", "flat"]).required(true))]

@@ -40,8 +40,8 @@ fn check_out(out: &Path) -> Result<(), CommandError> {
         return Ok(());
     }
     Err(CommandError::Usage(format!(
-        "--out {}: found the name of a file in a format that is not written, expected a file in TIFF \
-         (.tif) or FITS (.fits), or a directory",
+        "--out {}: found a file name with an unsupported format, expected a TIFF (.tif) or \
+         FITS (.fits) file, or a directory",
         out.display()
     )))
 }

@@ -37,15 +37,15 @@ impl Description<'_> {
         header.text("INSTRUME", &sheet.name, "simulated camera");
         header.text("IMAGETYP", self.kind(), "");
         header.real("EXPTIME", exposure_s, "[s] exposure");
-        header.real("XPIXSZ", sheet.pitch_x_um, "[um] distance of columns");
-        header.real("YPIXSZ", sheet.pitch_y_um, "[um] distance of rows");
+        header.real("XPIXSZ", sheet.pitch_x_um, "[um] pixel pitch along x");
+        header.real("YPIXSZ", sheet.pitch_y_um, "[um] pixel pitch along y");
         header.real("FOCALLEN", sheet.focal_length_mm, "[mm] focal length");
         header.real("APTDIA", sheet.aperture_mm, "[mm] diameter of the aperture");
         header.real("EGAIN", sheet.gain_e_per_adu, "[electron/adu]");
         header.real("RDNOISE", sheet.read_noise_e, "[electron]");
         let saturation_adu = self.simulated.frame.saturation_adu.map_or(0.0, f64::from);
         header.real("SATURATE", saturation_adu, "[adu]");
-        header.integer("BITS", i64::from(sheet.bits), "of a gray level");
+        header.integer("BITS", i64::from(sheet.bits), "bit depth");
         if let Some(pointing) = &self.simulated.pointing {
             let view = SkyView {
                 camera: self.generator.simulator.camera(),

@@ -5,28 +5,59 @@ use starpipe::base::format::counted;
 use starpipe::base::statistics::median_of;
 use starpipe::report::FrameReport;
 use std::collections::BTreeMap;
+use std::io;
 use std::time::Instant;
 
-/// Width of the frames' names, in columns.
-const NAME_WIDTH: usize = 24;
+/// Width of the columns before the frame's name, without the space between.
+const NUMBERS_WIDTH: usize = 47;
+/// Columns of a name that are shown even where the terminal is narrower.
+const MIN_NAME_WIDTH: usize = 12;
 
-/// The row of column names.
-pub(super) fn header() -> String {
-    let name = "frame";
-    format!(
-        "{name:<NAME_WIDTH$}{:>10}{:>9}{:>8}{:>9}{:>6}{:>6}{:>8}\n",
-        "RA (°)", "Dec (°)", "roll", "\u{2033}/px", "stars", "limit", "model"
-    )
+/// A table whose last column is the frame's name.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FrameTable {
+    /// Columns for the name; `None` for all that it has.
+    name_width: Option<usize>,
 }
 
-/// The row of a frame.
-pub(super) fn row(report: &FrameReport) -> String {
-    let name = ending(&report.frame);
+impl FrameTable {
+    /// Names are shortened to the width of a terminal, if standard output is one.
+    pub(super) fn for_stdout() -> Self {
+        let width = terminal_size::terminal_size_of(io::stdout());
+        let name_width = width.map(|(width, _)| {
+            usize::from(width.0)
+                .saturating_sub(NUMBERS_WIDTH + 1)
+                .max(MIN_NAME_WIDTH)
+        });
+        Self { name_width }
+    }
+
+    /// The row of column names.
+    pub(super) fn header(self) -> String {
+        format!(
+            "{:>7}{:>8}{:>7}{:>7}{:>6}{:>6}{:>6} frame\n",
+            "RA (°)", "Dec (°)", "roll", "\u{2033}/px", "stars", "limit", "model"
+        )
+    }
+
+    /// The row of a frame.
+    pub(super) fn row(self, report: &FrameReport) -> String {
+        let numbers = numbers(report);
+        let name = &report.frame;
+        let name = self
+            .name_width
+            .map_or_else(|| name.clone(), |width| ending(name, width));
+        format!("{numbers:<NUMBERS_WIDTH$} {name}\n")
+    }
+}
+
+/// What was measured of a frame, or why it was not.
+fn numbers(report: &FrameReport) -> String {
     let (Some(attitude), Some(optics), Some(matched)) =
         (&report.attitude, &report.optics, &report.matched)
     else {
         let reason = report.reason_code.unwrap_or_default();
-        return format!("{name:<NAME_WIDTH$} not identified: {reason}\n");
+        return format!("not identified: {reason}");
     };
     let limit = limit_of(report);
     let predicted = report
@@ -34,7 +65,7 @@ pub(super) fn row(report: &FrameReport) -> String {
         .as_ref()
         .and_then(|found| found.limit50_vmag);
     format!(
-        "{name:<NAME_WIDTH$}{:>10.4}{:>9.4}{:>8.2}{:>9.3}{:>6}{:>6}{:>8}\n",
+        "{:>7.3}{:>8.3}{:>7.1}{:>7.1}{:>6}{:>6}{:>6}",
         attitude.ra_deg,
         attitude.dec_deg,
         attitude.up_pa_deg,
@@ -50,12 +81,12 @@ fn limit_of(report: &FrameReport) -> Option<f64> {
 }
 
 /// The end of a name, in which names of frames differ.
-fn ending(name: &str) -> String {
+fn ending(name: &str, width: usize) -> String {
     let count = name.chars().count();
-    if count < NAME_WIDTH {
+    if count <= width {
         return name.to_owned();
     }
-    let end: String = name.chars().skip(count + 2 - NAME_WIDTH).collect();
+    let end: String = name.chars().skip(count + 1 - width).collect();
     format!("…{end}")
 }
 
@@ -93,7 +124,7 @@ impl RunSummary {
         let reasons = self.reasons.iter();
         parts.extend(reasons.map(|(code, count)| format!("{count} {code}")));
         if tally.failed > 0 {
-            parts.push(format!("{} not read", tally.failed));
+            parts.push(format!("{} unreadable", tally.failed));
         }
         if let Some(median) = median_of(self.limits_vmag.iter().copied()) {
             parts.push(format!("median limit V {median:.2}"));
@@ -110,9 +141,9 @@ mod tests {
 
     #[test]
     fn long_names_keep_their_end() {
-        assert_eq!(ending("night.tif"), "night.tif");
-        let long = ending("/data/2026-11-26/camera-3/frame-00017.tif");
-        assert_eq!(long.chars().count(), NAME_WIDTH - 1);
+        assert_eq!(ending("night.tif", 9), "night.tif");
+        let long = ending("/data/2026-11-26/camera-3/frame-00017.tif", 20);
+        assert_eq!(long.chars().count(), 20);
         assert!(
             long.starts_with('…') && long.ends_with("frame-00017.tif"),
             "{long}"

@@ -29,7 +29,7 @@ pub(crate) struct SolvingOptions {
 #[derive(Debug, Args, Serialize)]
 #[command(next_help_heading = "Identification")]
 struct IdentificationOptions {
-    /// Minimum odds that a name is right, to 1; stars with lower odds get no name
+    /// Minimum odds, NUMBER to 1, that a name is right; stars with lower odds get no name
     #[arg(long, value_name = "NUMBER", allow_hyphen_values = true,
           default_value_t = NAME_ODDS.to_string())]
     name_odds: String,

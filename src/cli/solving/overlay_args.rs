@@ -30,7 +30,7 @@ pub(super) struct OverlayArgs {
     /// Width of the picture, in pixels [default: that of the frame, or a whole fraction or multiple of it]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..=20_000), requires = "out")]
     overlay_width: Option<u32>,
-    /// A cut for sharing, with a caption: 1080 × 1080 or 1080 × 1350 pixels
+    /// Crop the picture for sharing, with a caption: 1080 × 1080 or 1080 × 1350 pixels
     #[arg(
         long,
         value_enum,
@@ -47,7 +47,7 @@ pub(super) struct OverlayArgs {
 /// How an overlay shows the frame.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum StretchOption {
-    /// Photographs of 8 bits as they are, linear data (FITS, 16 bits) with a dark sky brightened
+    /// 8-bit photographs are unchanged, the dark sky of linear data (FITS, 16 bits) is brightened
     Auto,
     /// Original levels
     None,

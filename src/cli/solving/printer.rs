@@ -1,6 +1,6 @@
 //! Reports on standard output, one after the other.
 
-use super::frame_table::{self, RunSummary};
+use super::frame_table::{FrameTable, RunSummary};
 use super::options::{OutputOptions, ReportFormat};
 use crate::cli::exit::OutcomeTally;
 use crate::cli::output::stdout::print;
@@ -17,6 +17,7 @@ pub(super) struct Printer {
     is_silent: bool,
     format: ReportFormat,
     text: TextOptions,
+    table: FrameTable,
     reports: usize,
     summary: RunSummary,
 }
@@ -37,6 +38,7 @@ impl Printer {
             is_silent: options.quiet && options.format.is_none(),
             format: options.format.unwrap_or(usual),
             text,
+            table: FrameTable::for_stdout(),
             reports: 0,
             summary: RunSummary::new(),
         }
@@ -79,8 +81,8 @@ impl Printer {
         Ok(match self.format {
             ReportFormat::Text if is_first => report.to_text(self.text),
             ReportFormat::Text => format!("\n{}", report.to_text(self.text)),
-            ReportFormat::Table if is_first => frame_table::header() + &frame_table::row(report),
-            ReportFormat::Table => frame_table::row(report),
+            ReportFormat::Table if is_first => self.table.header() + &self.table.row(report),
+            ReportFormat::Table => self.table.row(report),
             ReportFormat::Json => report.to_json_line()? + "\n",
             ReportFormat::Csv => report.to_csv(is_first)?,
             ReportFormat::FramesCsv => csv_of(row, is_first)?,

@@ -38,7 +38,7 @@ fn suite() -> Arg {
     Arg::new("suite")
         .long("suite")
         .value_name("SUITE")
-        .help("Run a suite in place of frames of one camera. Each has options of its own: starpipe validate --suite NAME --help")
+        .help("Run a suite of tests. Each suite has its own options: starpipe validate --suite NAME --help")
         .help_heading(None::<&str>)
         .display_order(0)
         .value_parser(PossibleValuesParser::new(names))
@@ -54,18 +54,19 @@ fn suite() -> Arg {
     starpipe validate --suite clutter --help\n\n\
     Frames are simulated and processed in memory, at attitudes that are uniform over all rotations. DIR\n\
     gets frames.csv and stars.csv with a row for each frame and each star, the same as Parquet in\n\
-    frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. A study\n\
-    writes all this for each value into DIR/NAME=VALUE/, and a row for each into study.csv and study.json.\n\n\
-    A run may be stopped at any time, also by Ctrl-C. The same command continues it, and one with more\n\
-    --count extends it. The results are the same to the last byte on any number of threads.\n\n\
-    These are the options without --suite. starpipe validate --suite NAME --help has those of a suite:\n\
-    hard, sky, robustness or clutter.")]
+    frames.parquet/ and stars.parquet/, a summary in summary.json and summary.txt, and figures. With\n\
+    --sweep, DIR/NAME=VALUE/ gets all of this for each value, and study.csv and study.json get a row for\n\
+    each value.\n\n\
+    A run may be stopped at any time, also by Ctrl-C. The same command continues it, and the same command\n\
+    with a larger --count extends it. The results do not depend on the number of threads.\n\n\
+    These are the options without --suite. For the options of a suite (hard, sky, robustness or clutter),\n\
+    see starpipe validate --suite NAME --help.")]
 pub(crate) struct ValidateArgs {
     /// Do not give the camera's description to the pipeline: it has no hints, not even the scale
     #[arg(long)]
     pub(super) scale_unknown: bool,
-    /// Study: a run for each value of one parameter, named as its option with _ or -, or fov_deg
-    /// (may be repeated); :log spaces the values by even ratios
+    /// Repeat the run for several values of a parameter, named like its option with _ or -, or
+    /// fov_deg (may be repeated); :log spaces the values logarithmically
     #[arg(
         long,
         value_name = "NAME=FROM:TO:COUNT[:log]",
@@ -109,13 +110,13 @@ pub(crate) struct SkyArgs {
 /// Options of all runs with simulated frames whose results a directory keeps.
 #[derive(Debug, Args)]
 pub(super) struct RunOptions {
-    /// Frames; in a study or a suite, of each value or case
+    /// Number of frames; with --sweep or --suite hard, for each value or case
     #[arg(long, alias = "frames", value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub(super) count: u64,
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Directory for the results; an interrupted run in it is continued
+    /// Directory for the results; an interrupted run in this directory is continued
     #[arg(short, long, value_name = "DIR")]
     pub(super) out: PathBuf,
     /// Format of the figures

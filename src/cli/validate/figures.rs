@@ -216,7 +216,7 @@ fn faintest(found: &DifferenceSummary) -> Sheet {
     )];
     if let Some(sd) = found.expected_sd.filter(|sd| *sd > 0.0) {
         let curve = normal_curve(1.5, sd);
-        let label = format!("expected, as if normal: scatter {sd:.2}");
+        let label = format!("expected scatter {sd:.2}, as a normal distribution");
         layers.push(PlotLayer::new(label, Rgb::ORANGE, Marks::Line(curve)));
     }
     Sheet::of_one(Panel {
@@ -242,15 +242,15 @@ fn attitude(found: &AttitudeSummary) -> Sheet {
     Sheet::of_one(Panel {
         title: format!("Errors of the attitude, of {} frames", found.frames),
         x: Axis::log("error (arcsec)", true),
-        y: Axis::new("% of the frames are off by less").within(0.0, 100.0),
+        y: Axis::new("% of the frames with a smaller error").within(0.0, 100.0),
         layers: vec![
             PlotLayer::new(
-                format!("boresight: half below {:.2}″", boresight.p50),
+                format!("boresight: median {:.2}″", boresight.p50),
                 Rgb::BLUE,
                 cumulative(&found.boresight_percentiles_arcsec),
             ),
             PlotLayer::new(
-                format!("roll: half below {:.1}″", roll.p50),
+                format!("roll: median {:.1}″", roll.p50),
                 Rgb::ORANGE,
                 cumulative(&found.roll_percentiles_arcsec),
             ),

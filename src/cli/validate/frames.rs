@@ -69,7 +69,7 @@ impl RunFrameRow {
     /// What went wrong.
     fn failure(&self) -> String {
         match (&self.reason, self.status) {
-            (_, Answer::Wrong) => "identified wrongly".to_owned(),
+            (_, Answer::Wrong) => "identified incorrectly".to_owned(),
             (Some(reason), _) => format!("not identified: {}", reason.replace('_', " ")),
             (None, _) => "not identified".to_owned(),
         }

@@ -65,7 +65,8 @@ pub(super) fn of_suite(
     let page = PageContent {
         title: format!("Hard cases for {camera}"),
         question: format!(
-            "How often is a frame identified where lens, spot or detector are not what the pipeline assumes? {}.",
+            "How often is a frame identified if lens, spot or detector differ from the model of the \
+             pipeline? {}.",
             counted(rows.len(), "case")
         ),
         text: HardRow::to_text(rows),
@@ -128,7 +129,7 @@ pub(super) fn of_study(
         ..PageContent::default()
     };
     for (name, sheet) in figures::of_study(rows) {
-        let caption = format!("Identification, limit and errors over {name}");
+        let caption = format!("Identification, limit and errors versus {name}");
         page.figures.push(figure(&sheet, &caption));
     }
     with_runs(page, &runs, failed)
@@ -173,7 +174,7 @@ fn cut_note(rows: usize) -> Option<String> {
 /// Counts of all frames, of right and of wrong ones as a sentence.
 fn rates([frames, right, wrong]: [usize; 3]) -> String {
     format!(
-        "{right} of {} identified rightly ({:.2} %), {wrong} wrongly, {} not.",
+        "{right} of {} identified correctly ({:.2} %), {wrong} incorrectly, {} not identified.",
         counted(frames, "frame"),
         100.0 * right as f64 / frames.max(1) as f64,
         frames - right - wrong
@@ -204,7 +205,7 @@ fn doubts(runs: &[TrialGroup]) -> Vec<String> {
             least = Some((share, said));
         }
     }
-    notes.extend(least.map(|(_, said)| format!("Lowest rate of right answers: {said}")));
+    notes.extend(least.map(|(_, said)| format!("Lowest rate of correct identifications: {said}")));
     let nees = runs.iter().filter_map(|TrialGroup { name, nees, .. }| {
         let (mean, sigma) = (*nees)?;
         Some(format!("{name}: {}", nees_note(mean, sigma)?))
@@ -216,7 +217,7 @@ fn doubts(runs: &[TrialGroup]) -> Vec<String> {
 fn answer(summary: &ValidationSummary) -> String {
     let all = &summary.identification.all;
     format!(
-        "{} 95 % interval of right answers: {:.2} to {:.2} %; of wrong ones: below {:.2} %.",
+        "{} 95 % interval of correct identifications: {:.2} to {:.2} %; of wrong ones: below {:.2} %.",
         rates([all.frames, all.right, all.wrong]),
         all.right_low_percent,
         all.right_high_percent,
@@ -227,7 +228,7 @@ fn answer(summary: &ValidationSummary) -> String {
 fn facts(summary: &ValidationSummary) -> Vec<Fact> {
     let completeness = &summary.completeness;
     let mut facts = vec![Fact::new(
-        "Half of the stars should be found at",
+        "Predicted 50 % detection limit",
         format!("V {:.3}", completeness.predicted_limit_vmag),
     )];
     if let (Some(limit), Some(sigma), Some(difference)) = (
@@ -236,16 +237,16 @@ fn facts(summary: &ValidationSummary) -> Vec<Fact> {
         completeness.difference_mag,
     ) {
         let value = format!("V {limit:.3} ± {sigma:.3}: {difference:+.3} mag from the prediction");
-        facts.push(Fact::new("Half are found at", value));
+        facts.push(Fact::new("Measured 50 % detection limit", value));
     }
     if let Some(attitude) = &summary.attitude {
         let nees = format!("{:.3} ± {:.3}", attitude.nees_mean, attitude.nees_sigma);
         facts.push(Fact::new("NEES (3 expected)", nees));
         for (name, of) in [
-            ("Boresight off by", &attitude.boresight_arcsec),
-            ("Roll off by", &attitude.roll_arcsec),
+            ("Error of the boresight", &attitude.boresight_arcsec),
+            ("Error of the roll", &attitude.roll_arcsec),
         ] {
-            let value = format!("{:.2}″ (half), {:.2}″ (95 %)", of.p50, of.p95);
+            let value = format!("{:.2}″ (median), {:.2}″ (95 %)", of.p50, of.p95);
             facts.push(Fact::new(name, value));
         }
     }
@@ -255,7 +256,7 @@ fn facts(summary: &ValidationSummary) -> Vec<Fact> {
         .map(|(name, pull)| format!("{name} {:+.2}, {:.2}", pull.mean, pull.sd))
         .collect();
     facts.push(Fact::new(
-        "Pulls (mean, standard deviation; 0, 1 expected)",
+        "Pulls: errors / stated errors (mean, standard deviation; 0, 1 expected)",
         pulls.join("; "),
     ));
     let detection = &summary.detection;
@@ -286,7 +287,10 @@ fn notes(summary: &ValidationSummary, rows: &[RunFrameRow]) -> Vec<String> {
     let mut notes = Vec::new();
     let wrong = summary.identification.all.wrong;
     if wrong > 0 {
-        notes.push(format!("{} identified wrongly.", counted(wrong, "frame")));
+        notes.push(format!(
+            "{} identified incorrectly.",
+            counted(wrong, "frame")
+        ));
     }
     let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
     for reason in rows.iter().filter_map(|row| row.reason.as_deref()) {
@@ -354,7 +358,7 @@ fn tables(summary: &ValidationSummary, frames: &[RunFrameRow]) -> anyhow::Result
 fn caption(name: &str) -> &'static str {
     match name {
         "identification" => "Identification rate by number of stars brighter than the limit",
-        "completeness" => "Detected share of the stars, and the prediction",
+        "completeness" => "Detected fraction of the stars, and the prediction",
         "centroids" => "Centroid errors, and the Cramér-Rao bound",
         "pulls" => {
             "Errors in units of their stated standard errors, with the standard normal distribution"

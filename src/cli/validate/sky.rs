@@ -124,7 +124,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
         vec![
             errors(
                 "Brightness of the zenith",
-                "V in a square arcsecond",
+                "V mag/arcsec²",
                 "measured − true (mag)",
                 zenith,
             ),
@@ -136,7 +136,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
             ),
             errors(
                 "Limit in clear cells",
-                "V in a square arcsecond at the zenith",
+                "V mag/arcsec² at the zenith",
                 "measured − expected (mag)",
                 limit,
             ),
@@ -146,7 +146,7 @@ pub(super) fn sheet(trials: &[SkyTrial], summary: &SkySummary) -> Sheet {
                 y: Axis::new("share of cells below 0.2 mag").within(0.0, 1.0),
                 layers: vec![
                     PlotLayer::new(
-                        "if true",
+                        "ideal",
                         Rgb::ORANGE,
                         Marks::Line(vec![(0.0, 0.0), (1.0, 1.0)]),
                     ),

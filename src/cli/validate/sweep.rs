@@ -54,7 +54,7 @@ mod tests {
         assert_eq!(sweep.values, [5.0, 10.0, 15.0, 20.0]);
         assert!(matches!(sweep.parameter, StudyParameter::FieldOfView));
         for (text, expected) in [
-            ("fov_deg=20:5:4", "expected a rising one"),
+            ("fov_deg=20:5:4", "expected increasing values"),
             ("fov_deg=5:180:4", "below 180 degrees"),
             ("fov_deg=0:20:4", "above 0"),
             ("apertur=5:20:4", "did you mean 'aperture_mm'?"),

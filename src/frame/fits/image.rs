@@ -34,7 +34,8 @@ impl<'a> FitsImage<'a> {
         if plane.is_none() && layout.is_cube() {
             let axes: Vec<String> = unit.axes.iter().map(usize::to_string).collect();
             let found = format!("a cube of {} planes ({})", layout.pages, axes.join(" x "));
-            let expected = "one plane, three or four of color, or a page that says which";
+            let expected =
+                "one plane, three or four color planes, or a page number that selects one";
             return Err(unsupported(found, expected));
         }
         let layout = if plane.is_some() && layout.pages > 1 {

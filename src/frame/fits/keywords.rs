@@ -78,7 +78,7 @@ impl StatedSaturation {
             frame.saturation_adu = Some(level_adu.min(of_format));
         } else {
             let text = self.level_adu.to_string();
-            metadata.ignore(self.keyword, &text, "a level that the data do not exceed");
+            metadata.ignore(self.keyword, &text, "a level that no pixel exceeds");
         }
     }
 }

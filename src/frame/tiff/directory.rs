@@ -97,7 +97,8 @@ impl<'a> TiffFile<'a> {
                 Err(error) => return Some(Err(error)),
             };
             if !seen.insert(place) {
-                let detail = format!("the directory at byte {place} is its own successor");
+                let detail =
+                    format!("the chain of directories leads back to the one at byte {place}");
                 return Some(Err(malformed(detail)));
             }
             let directory = self.directory(place);

@@ -131,7 +131,7 @@ impl<'a> Layout<'a> {
         let channels = color.channels(samples)?;
         let compression = Compression::parse(directory, depth, color)?;
         if color == Color::WhiteIsZero && depth.format == SampleFormat::Signed {
-            let found = "signed integers with white at 0".to_owned();
+            let found = "signed integers with WhiteIsZero".to_owned();
             return Err(unsupported(found, COLORS));
         }
         let predictor = Predictor::parse(directory, depth, compression)?;
@@ -364,11 +364,11 @@ impl Color {
             1 => return Ok(Self::BlackIsZero),
             2 => return Ok(Self::Rgb),
             6 => return Ok(Self::YCbCr),
-            3 => "a palette of colors".to_owned(),
-            4 => "a mask of transparency".to_owned(),
-            5 => "colors for print (CMYK)".to_owned(),
-            8..=10 => "colors in CIE Lab".to_owned(),
-            32803 => "a raw mosaic of colors (CFA)".to_owned(),
+            3 => "a color palette".to_owned(),
+            4 => "a transparency mask".to_owned(),
+            5 => "CMYK colors".to_owned(),
+            8..=10 => "CIE L*a*b* colors".to_owned(),
+            32803 => "a raw color mosaic (CFA)".to_owned(),
             34892 => "raw colors (LinearRaw)".to_owned(),
             other => format!("PhotometricInterpretation {other}"),
         };
@@ -409,7 +409,7 @@ impl Compression {
                 let found = match code {
                     2 | 3 => "CCITT compression (group 3)".to_owned(),
                     4 => format!("CCITT compression of {} bits", depth.bits),
-                    6 => "JPEG of the old kind (compression 6)".to_owned(),
+                    6 => "old-style JPEG (compression 6)".to_owned(),
                     7 => format!("JPEG of {} bits", depth.bits),
                     34712 => "JPEG 2000 compression".to_owned(),
                     34925 => "LZMA compression".to_owned(),

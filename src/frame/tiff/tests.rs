@@ -369,14 +369,14 @@ fn what_is_not_read_is_named_with_what_is() {
         (grey().with(258, 24).with(339, 3), "floats of 24 bits"),
         (grey().with(339, 6), "samples of type 6"),
         (mixed, "samples of 5, 6, 5 bits"),
-        (grey().with(262, 3), "a palette of colors"),
+        (grey().with(262, 3), "a color palette"),
         (grey().with(262, 5), "CMYK"),
         (
             grey().with(262, 6).with(277, 3),
             "YCbCr that is not in JPEG",
         ),
         (grey().with(277, 3), "3 samples of a gray pixel"),
-        (grey().with(259, 6), "JPEG of the old kind (compression 6)"),
+        (grey().with(259, 6), "old-style JPEG (compression 6)"),
         (grey().with(259, 7).with(258, 12), "JPEG of 12 bits"),
         (grey().with(259, 7).with(277, 2), "JPEG of 2 samples"),
         (grey().with(259, 3), "group 3"),
@@ -422,7 +422,8 @@ fn the_largest_image_is_the_frame_wherever_it_is() {
         level(&later, 0),
         (
             2.0,
-            "the largest of 3 images in the file was read: page 2, of 40 × 30 pixels; the first has 4 × 3"
+            "the largest of 3 images in the file was read: page 2, 40 × 30 pixels; the first image has 4 × \
+             3 pixels"
                 .to_owned()
         )
     );
@@ -432,7 +433,7 @@ fn the_largest_image_is_the_frame_wherever_it_is() {
     let (found, note) = level(std::slice::from_ref(&attached), 0);
     assert_eq!(found, 2.0);
     assert!(
-        note.contains("the one attached to page 1, of 40 × 30"),
+        note.contains("the image attached to page 1, 40 × 30"),
         "{note}"
     );
     assert_eq!(level(&[attached], 1).0, 1.0);
@@ -467,7 +468,7 @@ fn directories_that_follow_each_other_in_a_circle_end() {
     bytes[end..].copy_from_slice(&first);
     assert_eq!(decode(&bytes).unwrap().at(0, 0), 2.0);
     let error = decode_page(&bytes, NonZeroUsize::new(5)).unwrap_err();
-    assert!(error.to_string().contains("its own successor"), "{error}");
+    assert!(error.to_string().contains("leads back"), "{error}");
 }
 
 #[test]

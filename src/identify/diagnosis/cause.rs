@@ -119,7 +119,7 @@ impl fmt::Display for DoubleImage {
         let [x, y] = offset_px;
         write!(
             f,
-            "{pairs} pairs of detections have the offset ({x:+.1}, {y:+.1}) px"
+            "{pairs} pairs of detections are offset by ({x:+.1}, {y:+.1}) px"
         )
     }
 }

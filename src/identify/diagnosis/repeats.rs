@@ -51,9 +51,9 @@ impl fmt::Display for RepeatedSky {
         let how = if self.is_mirrored { ", mirrored," } else { "" };
         write!(
             f,
-            "the same sky stands in the picture more than once: {} of the bright stars around ({x:.0}, {y:.0}) \
-             are{how} around ({u:.0}, {v:.0}), too, as in a collage; the answer is that of one part, and the \
-             frame is no photograph of one sky",
+            "the same stars appear in the picture more than once, as in a collage: {} of the bright stars \
+             around ({x:.0}, {y:.0}) appear again{how} around ({u:.0}, {v:.0}); the result is for one part \
+             of the picture only",
             self.stars
         )
     }

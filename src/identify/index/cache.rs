@@ -141,7 +141,9 @@ impl IndexFile {
         }
         let corners = triangles.iter().flat_map(Triangle::corners);
         if corners.max().is_some_and(|corner| corner as usize >= stars) {
-            let what = format!("chunk {chunk} of class {class} names stars that are not there");
+            let what = format!(
+                "chunk {chunk} of class {class} refers to stars that are not in the catalog"
+            );
             return Err(self.delete_after(damaged(&self.path)(what)));
         }
         Ok(triangles)

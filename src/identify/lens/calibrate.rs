@@ -79,14 +79,14 @@ impl LensCalibration {
     pub fn to_toml(&self) -> String {
         let about = [
             format!(
-                "{MEASURED_BY} {} in {} stars of {} frames; residuals {:.3} px on each axis,",
+                "{MEASURED_BY} {} with {} stars in {} frames; residuals {:.3} px on each axis,",
                 env!("CARGO_PKG_VERSION"),
                 self.stars,
                 self.frames.len(),
                 self.rms_px
             ),
             format!(
-                "{:.3} px of stars that were left out of the fit.",
+                "{:.3} px for stars that were left out of the fit.",
                 self.held_out_rms_px
             ),
         ];

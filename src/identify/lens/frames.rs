@@ -48,13 +48,15 @@ pub enum Unfit {
         code: &'static str,
     },
     /// Its stars are off by the same noise as those of another frame: it is no further observation.
-    #[error("its stars have the same noise as those of {of}: it is a copy of the same exposure")]
+    #[error(
+        "its stars have the same centroid noise as those of {of}: it is a copy of the same exposure"
+    )]
     Copy {
         /// The name of the other.
         of: String,
     },
     /// It has another size, or is mirrored differently.
-    #[error("its size, {found}, differs from that of the others, {expected}")]
+    #[error("its size, {found}, differs from that of the other frames, {expected}")]
     OtherSize {
         /// What it has.
         found: String,
@@ -63,7 +65,7 @@ pub enum Unfit {
     },
     /// It has another focal length.
     #[error(
-        "its focal length, {found_px:.2} px, differs from that of the others, {expected_px:.2} px"
+        "its focal length, {found_px:.2} px, differs from that of the other frames, {expected_px:.2} px"
     )]
     OtherFocalLength {
         /// What it has.
@@ -73,7 +75,8 @@ pub enum Unfit {
     },
     /// The lens of the others misses its stars.
     #[error(
-        "the lens measured in the other frames does not fit it: residuals of {found_px:.2} px, in the others {expected_px:.2} px"
+        "the lens measured in the other frames does not fit: its residuals are {found_px:.2} px, those of \
+         the other frames {expected_px:.2} px"
     )]
     Misfit {
         /// Median distance of its stars, in pixels.

@@ -7,7 +7,7 @@ use crate::lab::robustness::{Answers, Interval};
 use crate::predict::Scenario;
 use serde::Serialize;
 
-const HEADING: &str = "                  frames   right  wrong  detected  false/Mpx asked for    named   wrong            95 %   stated\n";
+const HEADING: &str = "                  frames   right  wrong  detected  false/Mpx requested    named   wrong            95 %   stated\n";
 
 /// The results of all frames of a kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -21,7 +21,8 @@ pub struct Surface {
 pub enum SurfaceError {
     /// The grid is too small.
     #[error(
-        "a surface of {TERMS} x {TERMS} coefficients needs as many radii and noises, found {spots} x {noises}"
+        "a surface of {TERMS} x {TERMS} coefficients needs at least {TERMS} radii and {TERMS} noise levels, \
+         found {spots} and {noises}"
     )]
     TooFew {
         /// Number of radii.
@@ -31,7 +32,7 @@ pub enum SurfaceError {
     },
     /// A point has no error.
     #[error(
-        "at a radius of {spot_px} px and a noise of {noise} too few stars were found: {found} of {trials}"
+        "too few stars were detected at a radius of {spot_px} px and a noise of {noise}: {found} of {trials}"
     )]
     NoError {
         /// The radius.

@@ -23,15 +23,16 @@ impl ExperimentReport {
 }
 
 fn limit_text(limit: &LimitReport) -> String {
-    let mut text = "\nThe limit\n".to_owned();
+    let mut text = "\nLimiting magnitude\n".to_owned();
     let _ = writeln!(
         text,
-        "  V {:.2} by the paper's equations; the paper prints {:.2}, and its faintest star has {:.2}",
+        "  V {:.2} from the paper's equations; the paper states {:.2}, and its faintest star has {:.2}",
         limit.limit_vmag, limit.paper_limit_vmag, limit.paper_faintest_vmag
     );
     let _ = writeln!(
         text,
-        "  V {:.2} of this detector, which finds half of such stars: its filter adds up the light of a spot",
+        "  V {:.2} for half of the stars to be detected by the matched filter of starpipe, which sums the \
+         light of a spot",
         limit.detector_limit_vmag
     );
     text
@@ -39,7 +40,7 @@ fn limit_text(limit: &LimitReport) -> String {
 
 fn table_text(table: &TableReport) -> String {
     let mut text = format!(
-        "\nThe paper's stars, from its centroids and magnitudes: {} of {} are the paper's\n",
+        "\nThe paper's stars, identified from its centroids and magnitudes: {} of {} as in the paper\n",
         table.right,
         table.stars.len()
     );
@@ -63,7 +64,7 @@ fn table_text(table: &TableReport) -> String {
         Some(field) => {
             let _ = writeln!(
                 text,
-                "  center {} {}, up at {:.1}°, {:.2}″ a pixel, rms {:.2} px = {:.1}″",
+                "  center {} {}, up at {:.1}°, {:.2}″ per pixel, rms {:.2} px = {:.1}″",
                 hours(field.ra_deg, 0),
                 degrees(field.dec_deg, 0),
                 field.up_pa_deg,
@@ -86,14 +87,14 @@ fn zenith_text(table: &TableReport) -> String {
     };
     let stated_deg = table.stated_zenith_distance_deg;
     let both = format!(
-        "  zenith distance {stated_deg}° as stated, {found_deg:.1}° from site, time and center"
+        "  zenith distance {stated_deg}° as stated in the paper, {found_deg:.1}° from site, time and center"
     );
     let limit = match table.limit_there_vmag {
-        Some(v_mag) => format!("; there, the limit is V {v_mag:.2}"),
+        Some(v_mag) => format!("; at the latter, the limit is V {v_mag:.2}"),
         None => String::new(),
     };
     if (found_deg - stated_deg).abs() > TOLERANCE_DEG {
-        format!("{both}: they contradict each other{limit}\n")
+        format!("{both}: these contradict each other{limit}\n")
     } else {
         format!("{both}\n")
     }
@@ -109,17 +110,18 @@ fn unlisted_text(table: &TableReport) -> String {
     let (all, listed) = (field.stars_as_bright, table.stars.len());
     match field.brightest_unlisted_vmag {
         None => format!(
-            "  all {all} stars to V {faintest:.2} in the rectangle that they span are listed\n"
+            "  the paper lists all {all} stars to V {faintest:.2} in the rectangle that its stars span\n"
         ),
         Some(missing) => format!(
-            "  of the {all} stars to V {faintest:.2} in the rectangle that they span {listed} are listed; those missing begin at V {missing:.2}\n"
+            "  the paper lists {listed} of the {all} stars to V {faintest:.2} in the rectangle that its \
+             stars span; the brightest missing one has V {missing:.2}\n"
         ),
     }
 }
 
 fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars: usize) -> String {
     let mut text = format!(
-        "\n{} frames simulated with that camera, sky and pointing, moved by up to ±{} px: {} identified\n",
+        "\n{} frames simulated with this camera, sky and pointing, shifted by up to ±{} px: {} identified\n",
         simulated.frames, simulated.shift_px, simulated.frames_identified
     );
     let mut line = |label: &str, value: String| {
@@ -134,7 +136,8 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
     if let Some(expected) = &simulated.expected {
         let (mean, sigma) = (expected.mean_vmag, expected.sigma_mag);
         let limit = limit.detector_limit_vmag;
-        let why = format!("from the limit of V {limit:.2} and the catalog stars in the field");
+        let why =
+            format!("from the limiting magnitude V {limit:.2} and the catalog stars in the field");
         line(
             "faintest expected",
             format!("V {mean:.2}, scatter {sigma:.2}, {why}"),
@@ -143,7 +146,7 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
         let found = expected.stars_found;
         line(
             "stars named",
-            format!("{named:.1} a frame, {found:.1} expected"),
+            format!("{named:.1} per frame, {found:.1} expected"),
         );
     }
     let difference = simulated
@@ -163,7 +166,9 @@ fn simulated_text(simulated: &SimulatedReport, limit: &LimitReport, paper_stars:
     let (wrong, faintest) = (simulated.named_wrongly, simulated.faintest_wrong);
     let wrongly = match wrong {
         0 => "none".to_owned(),
-        _ => format!("{wrong} on all frames; {faintest} of these are the faintest named star"),
+        _ => format!(
+            "{wrong} in all frames; in {faintest} cases it is the faintest named star of the frame"
+        ),
     };
     line("named wrongly", wrongly);
     text += &completeness_text(simulated);

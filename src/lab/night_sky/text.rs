@@ -3,7 +3,7 @@
 use super::summary::{CellGroup, ClearTenth, GroupRow, SkySummary};
 use std::fmt::Write as _;
 
-const GROUPS_HEADING: &str = "Measured minus true: mean ± standard deviation, in magnitudes, and errors over stated errors, root mean square.
+const GROUPS_HEADING: &str = "Measured minus true: mean ± standard deviation in magnitudes, and RMS of error over stated error (1 expected).
 
                frames  right  wrong  measured                 zenith                  cells   extinction, RMS            limit    clouds, RMS    area
 ";
@@ -11,7 +11,7 @@ const CELLS_HEADING: &str = "
 cells                               brightness                 clouds                  limit
 ";
 const CLEAR_HEADING: &str = "
-Probability of a clear sky against the share of cells with less than 0.2 mag of clouds
+Stated probability of a clear sky, and fraction of cells with less than 0.2 mag of cloud extinction
                 cells     mean           band    share
 ";
 

@@ -101,7 +101,7 @@ impl VariedParameter {
     pub const fn title(self) -> &'static str {
         match self {
             Self::FieldOfView => "horizontal field of view (°)",
-            Self::Stars => "stars on a frame, on average",
+            Self::Stars => "mean number of stars per frame",
             Self::CentroidError => "centroid error on each axis (px)",
             Self::MagError => "magnitude error (mag)",
             Self::Missing => "stars missing (%)",

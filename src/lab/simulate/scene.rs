@@ -192,22 +192,22 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         rate_x_deg_s,
         RATES_DEG_S,
-        "angular rate of the camera about its x axis, in degrees a second"
+        "angular rate of the camera about its x axis, in degrees per second"
     ),
     key!(
         rate_y_deg_s,
         RATES_DEG_S,
-        "angular rate about its y axis, in degrees a second"
+        "angular rate of the camera about its y axis, in degrees per second"
     ),
     key!(
         rate_z_deg_s,
         RATES_DEG_S,
-        "angular rate about its boresight, in degrees a second"
+        "angular rate of the camera about its boresight, in degrees per second"
     ),
     key!(
         tumble_deg_s,
         RATES_DEG_S,
-        "tumbling satellite: angular rate about a random axis, in degrees a second"
+        "tumbling satellite: angular rate about a random axis, in degrees per second"
     ),
     key!(
         swing_deg,
@@ -217,27 +217,27 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         swing_period_s,
         NumberRange::Positive,
-        "period of that swing, in seconds"
+        "rolling ship: period of the swing, in seconds"
     ),
     key!(
         sky_gradient,
         NumberRange::FromTo(0.0, 1.0),
-        "how much brighter the sky is at one border than in the center, as a fraction"
+        "sky gradient: excess brightness at one border relative to the center, as a fraction"
     ),
     key!(
         sky_gradient_deg,
         ANGLES_DEG,
-        "direction of the brighter border, in degrees from image-up towards the right"
+        "direction of the brighter border, in degrees from image-up toward the right"
     ),
     optional_key!(
         moon_distance_deg,
         NumberRange::FromTo(0.0, 180.0),
-        "angle between boresight and Moon, in degrees; no Moon without it"
+        "angle between boresight and Moon, in degrees (default: no Moon)"
     ),
     key!(
         moon_direction_deg,
         ANGLES_DEG,
-        "direction of the Moon, in degrees from image-up towards the right"
+        "direction of the Moon, in degrees from image-up toward the right"
     ),
     key!(
         moon_phase_deg,
@@ -252,7 +252,7 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         cloud_mag,
         NumberRange::FromTo(0.0, 30.0),
-        "extinction where clouds are thickest, in magnitudes"
+        "extinction of the thickest clouds, in magnitudes"
     ),
     key!(
         cloud_size_px,
@@ -262,7 +262,7 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         cloud_light,
         NumberRange::NotNegative,
-        "light that the thickest cloud adds, relative to the clear sky"
+        "brightness that the thickest cloud adds, relative to the clear sky"
     ),
     optional_key!(
         cloud_share,
@@ -277,22 +277,22 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     optional_key!(
         cloud_bank_deg,
         ANGLES_DEG,
-        "direction the bank comes from, in degrees from image-up towards the right (default: above)"
+        "direction that the bank of clouds comes from, in degrees from image-up toward the right (default: 0)"
     ),
     optional_key!(
         cloud_bank_width_px,
         NumberRange::Positive,
-        "width of the bank, in pixels (default: unlimited)"
+        "width of the bank of clouds, in pixels (default: unlimited)"
     ),
     optional_key!(
         skyline_deg,
         NumberRange::FromTo(-90.0, 90.0),
-        "altitude up to which trees and houses hide the sky, in degrees; none without it"
+        "altitude up to which trees and houses hide the sky, in degrees (default: none)"
     ),
     key!(
         skyline_relief_deg,
         NumberRange::FromTo(0.0, 90.0),
-        "standard deviation of that altitude along the horizon, in degrees"
+        "standard deviation of the altitude of trees and houses along the horizon, in degrees"
     ),
     key!(
         skyline_light,
@@ -320,16 +320,20 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
         NumberRange::FromTo(0.0, 1e4),
         "mean number of satellite trails on a frame"
     ),
-    key!(trail_vmag, MAGNITUDES, "V magnitude of such a satellite"),
+    key!(
+        trail_vmag,
+        MAGNITUDES,
+        "V magnitude of a satellite with a trail"
+    ),
     key!(
         trail_rate_deg_s,
         NumberRange::Positive,
-        "angular speed of such a satellite, in degrees per second"
+        "angular speed of a satellite with a trail, in degrees per second"
     ),
     key!(
         by_altitude,
         NumberRange::FromTo(0.0, 1.0),
-        "1: airmass and airglow increase towards the horizon; 0: they are the same over the frame"
+        "1: airmass and airglow increase toward the horizon; 0: they are constant over the frame"
     ),
     key!(
         false_stars,
@@ -344,12 +348,12 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     key!(
         missing,
         NumberRange::FromTo(0.0, 1.0),
-        "fraction of the catalog's stars that are missing in the sky"
+        "fraction of the catalog stars that are missing in the sky"
     ),
     key!(
         vmag_sigma,
         NumberRange::FromTo(0.0, 10.0),
-        "standard deviation of the stars' magnitudes about the catalog's"
+        "standard deviation of the stars' magnitudes about the catalog magnitudes"
     ),
     optional_key!(
         faintest_vmag,
@@ -359,11 +363,11 @@ pub const SCENE_KEYS: &[Key<Scene>] = &[
     optional_key!(
         milky_way,
         NumberRange::NotNegative,
-        "light of the Milky Way's faint stars, relative to the real one (default: none)"
+        "brightness of the unresolved Milky Way, relative to the real one (default: none)"
     ),
     key!(
         stray_light,
         NumberRange::FromTo(0.0, 1.0),
-        "light that an all-sky lens scatters outside its image circle, relative to the mean sky inside"
+        "light scattered by an all-sky lens outside its image circle, relative to the mean sky inside"
     ),
 ];

@@ -50,7 +50,8 @@ impl Setup {
             let others = values[..number].iter().map(|(other, _)| other.name());
             let is_same = |other: &str| parameter.alternatives().any(|name| name == other);
             if let Some(other) = others.into_iter().find(|&other| is_same(other)) {
-                let what = format!("{other} and {name} set the same quantity: give one");
+                let what =
+                    format!("{other} and {name} set the same quantity: give only one of them");
                 return Err(ScenarioError::Contradiction(what));
             }
             if !parameter.limits().accept(found) {
@@ -88,13 +89,13 @@ impl Setup {
                 .any(|corner| camera.direction_of(corner).is_none());
         if found_px > most_px {
             return Some(format!(
-                "the image folds: the radial distortion, or twice the decentering and the stretch, is {found_px} \
-                 pixels, expected at most {most_px:.1} on this detector"
+                "the distortion is too large: the radial distortion, or twice the decentering plus the \
+                 stretch, is {found_px} pixels, expected at most {most_px:.1} for this detector"
             ));
         }
         is_blind.then(|| {
-            "the image folds before the corners of the frame: the radial distortion is too large, or the \
-             axis is too far away"
+            "the image folds back before the corners of the frame: the radial distortion is too large, or \
+             the optical axis is too far from the center"
                 .to_owned()
         })
     }
@@ -109,7 +110,8 @@ impl Setup {
         let has_trails = self.scene.trails > 0.0;
         let fault = |what: &str, found_deg: f64| {
             format!(
-                "{what} turns by up to {found_deg}° during the exposure of {exposure_s} s, expected at most {MAX_TURN_DEG}°"
+                "{what} rotates by up to {found_deg}° during the exposure of {exposure_s} s, expected at \
+                 most {MAX_TURN_DEG}°"
             )
         };
         if camera_deg > MAX_TURN_DEG {
@@ -126,7 +128,7 @@ impl Setup {
         } = &self.scenario;
         let mean = mean_cosmic_rays(&self.scene, camera, conditions.exposure_s);
         (mean > MAX_COSMIC_RAYS).then(|| {
-            format!("cosmic_rays_cm2_s leaves {mean} cosmic rays on a frame, expected at most {MAX_COSMIC_RAYS}")
+            format!("cosmic_rays_cm2_s gives {mean} cosmic rays per frame, expected at most {MAX_COSMIC_RAYS}")
         })
     }
 }
@@ -269,12 +271,12 @@ mod tests {
             let message = refused(change).unwrap_err();
             assert!(message.contains(what), "{message}");
         };
-        says(|s| s.scene.rate_x_deg_s = 1000.0, "turns by up to 100°");
-        says(|s| s.scene.tumble_deg_s = -1000.0, "turns by up to 100°");
-        says(|s| s.scene.swing_deg = 180.0 * 1e9, "the camera turns");
+        says(|s| s.scene.rate_x_deg_s = 1000.0, "rotates by up to 100°");
+        says(|s| s.scene.tumble_deg_s = -1000.0, "rotates by up to 100°");
+        says(|s| s.scene.swing_deg = 180.0 * 1e9, "the camera rotates");
         says(
             |s| (s.scene.trails, s.scene.trail_rate_deg_s) = (1.0, 1e12),
-            "a satellite turns",
+            "a satellite rotates",
         );
         assert_eq!(refused(|s| s.scene.trail_rate_deg_s = 1e12), Ok(()));
         says(|s| s.scene.cosmic_rays_cm2_s = 1e9, "cosmic rays");
@@ -282,11 +284,11 @@ mod tests {
         // Half the diagonal is 1620 px: 4/27 of it, 240 px, are the most.
         says(
             |s| s.scenario.camera.imperfections.distortion_px = -241.0,
-            "folds",
+            "distortion is too large",
         );
         says(
             |s| s.scenario.camera.imperfections.decentring_y_px = 487.0,
-            "folds",
+            "distortion is too large",
         );
         let mut most = Setup {
             scenario: Scenario::of(Preset::NanosatTracker),

@@ -11,14 +11,17 @@ pub enum DefocusError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The camera has no limiting magnitude.
-    #[error("the camera has no limit from which a magnitude follows")]
+    #[error(
+        "the camera has no limiting magnitude, so no magnitude can be chosen for the star: give one"
+    )]
     NoLimit,
     /// An error could not be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
     /// The star is too faint.
     #[error(
-        "a star of V {v_mag} is found too seldom at these radii to measure it: half of the stars are found at V {limit_vmag:.2} at best"
+        "a star of V {v_mag} is too faint to measure at these radii: at best, half of the stars of V \
+         {limit_vmag:.2} are detected"
     )]
     TooFaint {
         /// V magnitude of the star.
@@ -33,14 +36,15 @@ pub enum DefocusError {
 #[non_exhaustive]
 pub enum NoiseError {
     /// The dark frames have no noise, or their full scale is unknown.
-    #[error("the dark frames have no noise, or no full scale")]
+    #[error("the dark frames have no noise, or their full scale is unknown")]
     NoRelativeNoise,
     /// The noise from frame to frame could not be measured.
     #[error(
-        "the dark frames have no temporal noise: expected two or more of one exposure, with a noise above half a gray level"
+        "the dark frames have no temporal noise: expected two or more with the same exposure, and a noise \
+         above half a gray level"
     )]
     NoTemporalNoise,
     /// The noise is zero.
-    #[error("the noise of a pixel in the dark is 0 e, expected more")]
+    #[error("the noise of a dark pixel is 0 e, expected more than 0")]
     Zero,
 }

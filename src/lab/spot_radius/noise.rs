@@ -112,8 +112,7 @@ impl Noise {
     pub fn of_good_pixels(darks: DarkNoise, scenario: &Scenario) -> Result<Self, NoiseError> {
         let temporal_adu = darks.temporal_adu.ok_or(NoiseError::NoTemporalNoise)?;
         let noise_adu = libm::hypot(temporal_adu, darks.pattern_adu.unwrap_or(0.0));
-        let source =
-            "the dark frames: from frame to frame and from pixel to pixel, hot pixels left out";
+        let source = "the dark frames: temporal and fixed-pattern noise, without hot pixels";
         Ok(Self {
             darks: Some(darks),
             ..Self::of_electrons(noise_adu * scenario.camera.gain_e_per_adu, scenario, source)?

@@ -34,12 +34,12 @@ impl DefocusReport {
     pub fn heading_text(&self) -> String {
         let mut text = normalisation_text(self.stars.first().and_then(|star| star.peak));
         let centroid = match self.centroid {
-            Centroiding::GaussianFit => "fit of a Gaussian spot",
-            Centroiding::GreyWeighted => "center of the light above a threshold",
-            Centroiding::FixedWindow => "center of the light in a fixed window",
+            Centroiding::GaussianFit => "fit of a Gaussian",
+            Centroiding::GreyWeighted => "center of gravity above a threshold",
+            Centroiding::FixedWindow => "center of gravity in a fixed window",
         };
         let noise = match (self.noise.e, self.noise.relative) {
-            (Some(e), _) => format!("{} e of a pixel in the dark", five_digits(e)),
+            (Some(e), _) => format!("{} e per dark pixel", five_digits(e)),
             (None, Some(relative)) => format!("{} of full scale", five_digits(relative)),
             (None, None) => String::new(),
         };
@@ -78,10 +78,10 @@ impl DefocusReport {
     fn best_text(&self, best: &BestRadius) -> String {
         let [from, to] = best.nearly_px;
         format!(
-            "{}; within 5 % of it from {from:.2} to {to:.2} px{}",
+            "{}; at most 5 % more from {from:.2} to {to:.2} px{}",
             self.radius_and_error_text(&best.radius),
             if best.is_at_edge {
-                "; at the edge of the range of radii"
+                "; at the edge of the tested range"
             } else {
                 ""
             }
@@ -118,7 +118,7 @@ impl DefocusReport {
             (Some(um), _) => {
                 let _ = write!(text, ", {um:.1} µm out of focus");
             }
-            (None, Some(_)) => text += ", smaller than in focus",
+            (None, Some(_)) => text += ", smaller than the spot in focus",
             (None, None) => (),
         }
         text
@@ -127,7 +127,7 @@ impl DefocusReport {
     /// The radii of each line of equal error at a few noises.
     fn isolines_text(&self, star: &DefocusStarReport) -> String {
         let mut text = format!(
-            "\n  radii (px) of equal error at a noise of ({})\n",
+            "\n  radii (px) with equal error, by noise ({})\n",
             self.noise_unit
         );
         let noises = self.noises_shown();
@@ -184,7 +184,7 @@ impl DefocusReport {
         };
         let _ = writeln!(
             text,
-            "  surface (eq. 13): residual {residual_px:.5} px, of chance {scatter_px:.5} px"
+            "  surface (eq. 13): residual {residual_px:.5} px, expected by chance {scatter_px:.5} px"
         );
         if let Some(paper) = &surface.paper {
             text += &paper_text(own, paper);
@@ -207,7 +207,8 @@ fn normalisation_text(peak: Option<f64>) -> String {
 
 fn lens_text(lens: &DefocusLens) -> String {
     format!(
-        "defocus: geometric blur alone, at f/{} with a spot of {} px in focus; diffraction limit {} px at {} nm\n",
+        "defocus: geometric blur only, at f/{} with a spot of {} px in focus; diffraction limit {} px at {} \
+         nm\n",
         five_digits(lens.f_number),
         five_digits(lens.focused_px),
         five_digits((lens.diffraction_px() * 1e3).round() / 1e3),
@@ -316,7 +317,8 @@ fn parabolas_text(line: &IsoLine) -> String {
 
 fn closed_form_text(closed_form: &ClosedFormReport, scatter_px: f64) -> String {
     format!(
-        "  closed form: mean square {:.4} ± {:.4} of that expected; RMS difference {:.5} px, of chance {scatter_px:.5} px\n",
+        "  closed form: measured over expected mean square error {:.4} ± {:.4}; RMS difference {:.5} px, \
+         expected by chance {scatter_px:.5} px\n",
         closed_form.mean_square_ratio,
         closed_form.mean_square_ratio_sigma,
         closed_form.difference_px,
@@ -325,7 +327,8 @@ fn closed_form_text(closed_form: &ClosedFormReport, scatter_px: f64) -> String {
 
 fn paper_text(own: &Surface, paper: &PaperSurface) -> String {
     format!(
-        "  the paper's: residual {} px; RMS over the grid from our surface {:.5} px, from our errors {:.5} px\n{}",
+        "  the paper's surface: residual {} px; RMS difference over the grid from our surface {:.5} px, \
+         from our errors {:.5} px\n{}",
         five_digits(paper.residual_px),
         paper.surface_difference_px,
         paper.errors_difference_px,

@@ -113,7 +113,7 @@ mod tests {
         protocol.setup.scenario.conditions.exposure_s = 0.7;
         let message = claim(&protocol).unwrap_err().to_string();
         assert!(
-            message.contains("exposure_s is 0.1 there, but 0.7 here, seed is 18446744073709551615 there, but 1 here"),
+            message.contains("exposure_s was 0.1, now 0.7, seed was 18446744073709551615, now 1"),
             "{message}"
         );
     }

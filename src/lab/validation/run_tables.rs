@@ -87,7 +87,7 @@ impl RunTables {
             let (number, seed) = (self.done, seed_of(self.done));
             if (row.frame, row.seed) != (number, seed) {
                 return Err(frames.changed(format!(
-                    "frame {} with the seed {}, expected frame {number} with the seed {seed}",
+                    "frame {} with seed {}, expected frame {number} with seed {seed}",
                     row.frame, row.seed
                 )));
             }

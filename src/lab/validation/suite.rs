@@ -31,52 +31,52 @@ impl HardCase {
 pub const HARD_SUITE: [HardCase; 20] = [
     HardCase {
         name: "ideal",
-        what: "as the camera is described",
+        what: "camera as described",
         change: |_| (),
     },
     HardCase {
         name: "through-air",
-        what: "from the ground, up to 70 degrees from the zenith: refraction",
+        what: "from the ground, up to 70 degrees from the zenith, with refraction",
         change: |run| run.site = Site::new(50.0, 10.0, 300.0).ok(),
     },
     HardCase {
         name: "lens-r3",
-        what: "lens with r³: 25 thousandths in the corner",
+        what: "r³ distortion: 2.5 % of the half-diagonal in the corner",
         change: |run| lens(run, &[25.0]),
     },
     HardCase {
         name: "lens-r3-r5",
-        what: "r³ and r⁵: 25 thousandths",
+        what: "r³ and r⁵ distortion: 2.5 % of the half-diagonal in the corner",
         change: |run| lens(run, &[17.0, 8.0]),
     },
     HardCase {
         name: "lens-strong",
-        what: "r³ and r⁵: 62 thousandths",
+        what: "r³ and r⁵ distortion: 6.2 % of the half-diagonal in the corner",
         change: |run| lens(run, &[83.0, -21.0]),
     },
     HardCase {
         name: "lens-r3-r5-r7",
-        what: "r³, r⁵ and r⁷ of alternating sign",
+        what: "r³, r⁵ and r⁷ distortion with alternating signs",
         change: |run| lens(run, &[-69.0, 41.0, -17.0]),
     },
     HardCase {
         name: "lens-5-percent",
-        what: "5 % at half of the width of a square frame",
+        what: "r³ distortion: 5 % at the edge of a square frame",
         change: |run| lens(run, &[100.0]),
     },
     HardCase {
         name: "lens-decentred",
-        what: "r³ and r⁵, decentered",
+        what: "r³ and r⁵ distortion, decentered",
         change: |run| lens(run, &[28.0, -11.0, 0.0, 0.0, 0.0, 2.8, -1.4]),
     },
     HardCase {
         name: "lens-off-centre",
-        what: "r³, and the axis 2 % of half of the diagonal off the center",
+        what: "r³ distortion, and the optical axis off the center by 2 % of the half-diagonal",
         change: |run| lens(run, &[-50.0, 0.0, 0.0, 16.0, 12.0]),
     },
     HardCase {
         name: "spot-disc",
-        what: "spots are discs of 4 px radius",
+        what: "out of focus: disks of 4 px radius",
         change: |run| {
             let camera = &mut run.setup.scenario.camera;
             camera.imperfections.spot_form = SpotForm::Disc;
@@ -113,7 +113,7 @@ pub const HARD_SUITE: [HardCase; 20] = [
     },
     HardCase {
         name: "spot-astigmatism",
-        what: "spots twice as long as wide in the corner, radially",
+        what: "spots twice as long as wide in the corner, radially elongated",
         change: |run| {
             let camera = &mut run.setup.scenario.camera;
             let radius_px = 3f64.sqrt() * camera.spot_sigma_px;
@@ -123,12 +123,12 @@ pub const HARD_SUITE: [HardCase; 20] = [
     },
     HardCase {
         name: "spot-moffat",
-        what: "wings of a Moffat profile with exponent 2.5",
+        what: "Moffat profile with exponent 2.5",
         change: |run| run.setup.scenario.camera.imperfections.spot_form = SpotForm::Moffat,
     },
     HardCase {
         name: "spot-airy",
-        what: "Airy pattern of a pupil obstructed by a third",
+        what: "Airy pattern of a pupil with a central obstruction of 33 %",
         change: |run| {
             let made = &mut run.setup.scenario.camera.imperfections;
             (made.spot_form, made.obstruction) = (SpotForm::Airy, 0.33);
@@ -149,7 +149,7 @@ pub const HARD_SUITE: [HardCase; 20] = [
     },
     HardCase {
         name: "response",
-        what: "response of the pixels differs by 3 %",
+        what: "pixel response varies by 3 %",
         change: |run| run.setup.scenario.camera.imperfections.response_sigma = 0.03,
     },
 ];
@@ -173,7 +173,7 @@ fn lens(run: &mut ValidationProtocol, thousandths: &[f64]) {
     ] = std::array::from_fn(|term| thousandths.get(term).map_or(0.0, |given| given * unit_px));
 }
 
-const HEADING: &str = "Mean and standard deviation of errors over stated errors, 0 and 1 expected; NEES 3 expected.
+const HEADING: &str = "Mean and standard deviation of error over stated error (0 and 1 expected); NEES (3 expected).
 
                  frames  right  wrong   NEES     x     y           flux   focal length     zero point   limit  split  notes
 ";

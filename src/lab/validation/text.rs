@@ -7,7 +7,7 @@ use super::summary::{
 use std::fmt::Write as _;
 
 const CENTROIDS_HEADING: &str = "
-Centroids of isolated stars that are not saturated, errors on one axis
+Centroids of isolated, unsaturated stars; errors on one axis
               SNR     stars     rms px   bound px           ratio  stated px    light  its ratio
 ";
 const PULLS_HEADING: &str = "
@@ -28,7 +28,7 @@ impl ValidationSummary {
             facts.height_px,
             facts.seed,
             match facts.scale_known {
-                true => "scale known from the camera's description",
+                true => "scale known from the camera description",
                 false => "scale unknown",
             }
         );
@@ -67,9 +67,10 @@ impl ValidationSummary {
         let d = &self.detection;
         let per_frame = |count: u64| count as f64 / self.frames.max(1) as f64;
         format!(
-            "\nDetection\n  a frame has {:.1} detections, {:.1} of them named; named wrongly {} of {}, {} of these as another star at the same position\n  \
-             false: {} on all frames, {} per million pixels (95 %: {} to {}), accepted {}\n  \
-             blends {}, rejected as not stars {}, stars detected as several {}\n",
+            "\nDetection\n  {:.1} detections per frame, {:.1} of them named; {} of {} names are wrong, {} \
+             of these name another star at the same position\n  false: {} in all frames, {} per million \
+             pixels (95 %: {} to {}), requested {}\n  blends {}, rejected as not stars {}, stars split into \
+             several detections {}\n",
             per_frame(d.detected),
             per_frame(d.named),
             d.misnamed,
@@ -89,7 +90,7 @@ impl ValidationSummary {
     fn completeness_text(&self) -> String {
         let c = &self.completeness;
         let mut text = format!(
-            "\nCompleteness of isolated stars\n  half of such stars should be found at V {:.3}\n",
+            "\nCompleteness of isolated stars\n  predicted limiting magnitude (50 %): V {:.3}\n",
             c.predicted_limit_vmag
         );
         if let (Some(limit), Some(sigma), Some(predicted), Some(difference)) = (
@@ -100,8 +101,8 @@ impl ValidationSummary {
         ) {
             let _ = writeln!(
                 text,
-                "  fitted to those found: V {limit:.3} ± {sigma:.3}; to their predicted probabilities: V {predicted:.3}; \
-                 difference {difference:+.3} mag"
+                "  fitted to the detections: V {limit:.3} ± {sigma:.3}; to the predicted probabilities: V \
+                 {predicted:.3}; difference {difference:+.3} mag"
             );
         }
         text += "        V     stars     found   measured              95 %  predicted\n";
@@ -155,7 +156,7 @@ impl ValidationSummary {
     }
 
     fn differences_text(&self) -> String {
-        let mut text = "\nMeasured minus expected, on frames\n".to_owned();
+        let mut text = "\nMeasured minus expected, per frame\n".to_owned();
         let mut line = |name: &str, unit: &str, of: &DifferenceSummary| {
             let expected = of
                 .expected_sd
@@ -167,13 +168,13 @@ impl ValidationSummary {
             );
         };
         line("faintest star named", " mag", &self.faintest);
-        line("limit by the frame alone", " mag", &self.frame_limit);
+        line("measured limit", " mag", &self.frame_limit);
         line("zero point", " mag", &self.zero_point);
         line("background", " ADU", &self.background);
         let noise = &self.noise_ratio;
         let _ = writeln!(
             text,
-            "  noise, over the true one {:.4} ± {:.4}, scatter {:.4}; {} frames",
+            "  measured over true noise {:.4} ± {:.4}, scatter {:.4}; {} frames",
             noise.mean, noise.mean_sigma, noise.sd, noise.count
         );
         text
@@ -198,7 +199,7 @@ impl PullSummary {
         [
             ("star's x", &self.x),
             ("star's y", &self.y),
-            ("star's light", &self.flux),
+            ("star's flux", &self.flux),
             ("turn about x", &self.attitude_x),
             ("turn about y", &self.attitude_y),
             ("roll", &self.roll),
@@ -237,14 +238,13 @@ fn attitude_text(attitude: &AttitudeSummary) -> String {
             q.p50, q.p68, q.p95, q.p99, q.max
         );
     };
-    line("boresight off by", &attitude.boresight_arcsec);
-    line("roll off by", &attitude.roll_arcsec);
+    line("boresight error", &attitude.boresight_arcsec);
+    line("roll error", &attitude.roll_arcsec);
     let [x, y, roll] = attitude.rms_arcsec;
     let _ = writeln!(
         text,
-        "  root mean square: about x {x:.3}, about y {y:.3}, roll {roll:.3}\n  \
-         mean of the squared error in units of its covariance {:.3}, expected 3 ± {:.3}\n  \
-         residuals {:.4} px root mean square",
+        "  root mean square: about x {x:.3}, about y {y:.3}, roll {roll:.3}\n  mean NEES {:.3}, expected 3 \
+         ± {:.3}\n  residuals {:.4} px root mean square",
         attitude.nees_mean, attitude.nees_sigma, attitude.rms_px
     );
     text

@@ -166,7 +166,10 @@ fn field_text(camera: &CameraModel) -> String {
         Some((x_rad, y_rad)) => {
             format!("{:.2}° × {:.2}°", x_rad * DEG_PER_RAD, y_rad * DEG_PER_RAD)
         }
-        None => format!("{:.0}° around the axis", camera.radius_rad() * DEG_PER_RAD),
+        None => format!(
+            "within {:.0}° of the axis",
+            camera.radius_rad() * DEG_PER_RAD
+        ),
     }
 }
 
@@ -175,8 +178,8 @@ fn draw_counts(canvas: &mut Canvas, [left, y]: [f32; 2], right: f32, marks: &[Ma
     let count = |kind: MarkKind| marks.iter().filter(|mark| mark.kind == kind).count();
     let kinds = [
         (MarkKind::Identified, "identified"),
-        (MarkKind::Placed, "at their place, not measured"),
-        (MarkKind::Body, "of the solar system"),
+        (MarkKind::Placed, "not measured, at catalog position"),
+        (MarkKind::Body, "solar system objects"),
         (MarkKind::Unidentified, "not identified"),
         (MarkKind::NotAStar, "not a star"),
     ];

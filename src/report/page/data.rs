@@ -42,6 +42,8 @@ struct StarColumns<'a> {
     flux: Vec<Option<f64>>,
     id: Vec<Option<&'a str>>,
     name: Vec<Option<&'a str>>,
+    /// What it is called in a picture, for those that are named.
+    label: Vec<Option<String>>,
     hip: Vec<Option<u32>>,
     hd: Vec<Option<u32>>,
     v: Vec<Option<f64>>,
@@ -51,7 +53,7 @@ struct StarColumns<'a> {
 }
 
 impl<'a> StarColumns<'a> {
-    fn add(&mut self, star: &'a StarReport, offset: Option<[f64; 2]>) {
+    fn add(&mut self, star: &'a StarReport, offset: Option<[f64; 2]>, label: Option<String>) {
         let rounded = |value: f64, decimals| to_decimals(value, decimals);
         self.x.push(rounded(star.x, 2));
         self.y.push(rounded(star.y, 2));
@@ -61,6 +63,7 @@ impl<'a> StarColumns<'a> {
         self.flux.push(star.flux);
         self.id.push(star.id.as_deref());
         self.name.push(star.name.as_deref());
+        self.label.push(label);
         self.hip.push(star.hip);
         self.hd.push(star.hd);
         self.v.push(star.vmag);
@@ -80,8 +83,9 @@ impl<'a> PageData<'a> {
         let numbered = report.stars.iter().enumerate();
         let unlike_stars = numbered.filter(unlike).map(|(number, _)| number).collect();
         let mut stars = StarColumns::default();
-        for (star, offset) in report.stars.iter().zip(offsets) {
-            stars.add(star, offset);
+        let matches = solution.matches_by_source();
+        for ((star, offset), found) in report.stars.iter().zip(offsets).zip(matches) {
+            stars.add(star, offset, found.map(|found| catalog.label(found.star)));
         }
         Self {
             width: report.width,

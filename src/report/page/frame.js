@@ -1,5 +1,5 @@
 // What a star is called.
-const titleOf = (star) => star.name || star.label || (star.hd ? `HD ${star.hd}` : "") || star.id || (star.kind === "other" ? "Not a star" : "Not identified");
+const titleOf = (star) => star.label || (star.kind === "other" ? "Not a star" : "Not identified");
 
 // A small card beside the star that was chosen.
 const makeCard = (card, view, onClose) => {
@@ -7,7 +7,7 @@ const makeCard = (card, view, onClose) => {
   const add = (parent, tag, text) => parent.appendChild(Object.assign(document.createElement(tag), { textContent: text }));
   const fixed = (value, decimals) => value.toFixed(decimals).replace("-", "−");
   const linesOf = (star) => [
-    star.label === titleOf(star) ? "" : star.label,
+    star.name === star.label ? "" : star.name,
     star.v === undefined ? "" : `V ${fixed(star.v, 2)}`,
     star.why && `Not measured: ${star.why}`,
     star.ra === undefined ? "" : `RA ${fixed(star.ra, 3)}°, Dec ${fixed(star.dec, 3)}°`,
@@ -97,12 +97,12 @@ const showFrame = (root, data) => {
   stars.forEach((star, index) => {
     star.index = index;
     star.kind = star.id ? "identified" : unlikeStars.has(index) ? "other" : "unidentified";
+    star.label ??= labels.get(index);
     star.residual = star.dx === undefined ? undefined : Math.hypot(star.dx, star.dy);
-    star.label = labels.get(index);
   });
   const isPoint = ({ kind, detection, x, y }) => ["star", "body"].includes(kind) && !Number.isInteger(detection) && Number.isFinite(x) && Number.isFinite(y);
   const unmeasured = annotations.filter(isPoint).map((it) => ({
-    kind: "unmeasured", x: it.x, y: it.y, name: it.name || it.label, label: it.label, v: it.vmag ?? undefined, id: it.id ?? undefined,
+    kind: "unmeasured", x: it.x, y: it.y, name: it.name, label: it.label, v: it.vmag ?? undefined, id: it.id ?? undefined,
     why: it.why || "it was not detected", flags: [],
   }));
   const marked = [...stars, ...unmeasured];
@@ -172,7 +172,7 @@ const showFrame = (root, data) => {
     return new Set(inView.slice(0, count));
   };
   // The brightest stars in view, where there is room.
-  const byMagnitude = marked.filter((star) => star.name || star.id).sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
+  const byMagnitude = marked.filter((star) => star.label).sort((a, b) => (a.v ?? 99) - (b.v ?? 99));
   const placeNames = (u, ringed) => {
     const MOST = 60, SIZE = 12;
     layers.names.replaceChildren();
@@ -183,7 +183,7 @@ const showFrame = (root, data) => {
     const named = shown.filter((star) => star.name);
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
       if (taken.length >= MOST + skyNames.length) break;
-      const text = star.name || (star.hd ? `HD ${star.hd}` : star.id);
+      const text = star.label;
       // To the left of its star where it would leave the picture.
       const off = (radius(star) + 4) * u, wide = text.length * SIZE * 0.6 * u;
       const isLeft = star.x + off + 0.88 * wide > box.x + box.w;
@@ -304,7 +304,8 @@ const showFrame = (root, data) => {
   const number = (value, decimals) => (value === undefined || value === null ? "" : value.toFixed(decimals));
   const tell = (star) => {
     const parts = [titleOf(star)];
-    if (star.name && star.id) parts.push(star.id);
+    if (star.name && star.name !== star.label) parts.push(star.name);
+    if (star.id && star.id !== star.label) parts.push(star.id);
     if (star.hd) parts.push(`HD ${star.hd}`);
     if (star.hip) parts.push(`HIP ${star.hip}`);
     if (star.v !== undefined) parts.push(`V ${number(star.v, 2)}`);
@@ -390,7 +391,7 @@ const showFrame = (root, data) => {
   const bins = data.completeness.filter((bin) => bin.stars > 0);
   if (bins.length > 1) {
     const [low, high] = [bins[0].vmag - 0.25, bins[bins.length - 1].vmag + 0.25];
-    const plot = figure("Share of the catalog's stars that are found", ["V (mag)", low, high], ["share", 0, 1]);
+    const plot = figure("Fraction of catalog stars that are detected", ["V (mag)", low, high], ["fraction", 0, 1]);
     for (const bin of bins) {
       const part = bin.detected / bin.stars;
       const bar = make(plot.svg, "rect", { class: "part", x: plot.x(bin.vmag - 0.22), y: plot.y(part), width: plot.x(0.44) - plot.x(0), height: plot.y(0) - plot.y(part) });
@@ -401,7 +402,7 @@ const showFrame = (root, data) => {
       make(plot.svg, "line", { class: kind, x1: plot.x(v), x2: plot.x(v), y1: plot.y(1), y2: plot.y(0) });
       make(plot.svg, "text", { x: plot.x(v) + 4, y: plot.y(1) + down }, `${name} ${v.toFixed(2)}`);
     };
-    mark(data.limit50_vmag, "half at", "fit", 10);
+    mark(data.limit50_vmag, "50 % limit", "fit", 10);
     mark(data.predicted_vmag, "predicted", "predicted", 24);
   }
 

@@ -236,7 +236,7 @@ fn field(camera: &CameraModel) -> String {
     let degrees = |angle_rad: f64| angle_rad * DEG_PER_RAD;
     match camera.fov_x_rad().zip(camera.fov_y_rad()) {
         Some((x, y)) => format!("{:.4} x {:.4} deg", degrees(x), degrees(y)),
-        None => format!("{:.1} deg around the axis", degrees(camera.radius_rad())),
+        None => format!("within {:.1} deg of the axis", degrees(camera.radius_rad())),
     }
 }
 

@@ -92,17 +92,19 @@ impl fmt::Display for Proposal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (lat, lon) = (self.site.lat_deg(), self.site.lon_deg());
         match self.change {
-            Change::LatitudeSign => write!(f, "the latitude {lat:.2}° (other sign)"),
-            Change::LongitudeSign => write!(f, "the longitude {lon:.2}° (other sign)"),
-            Change::BothSigns => write!(f, "the site {lat:.2},{lon:.2} (both signs)"),
-            Change::Exchanged => write!(f, "the site {lat:.2},{lon:.2} (exchanged)"),
+            Change::LatitudeSign => write!(f, "latitude {lat:.2}° (sign reversed)"),
+            Change::LongitudeSign => write!(f, "longitude {lon:.2}° (sign reversed)"),
+            Change::BothSigns => write!(f, "site {lat:.2},{lon:.2} (both signs reversed)"),
+            Change::Exchanged => {
+                write!(f, "site {lat:.2},{lon:.2} (latitude and longitude swapped)")
+            }
             Change::Place => write!(
                 f,
-                "another site, near {lat:.0},{lon:.0} if the camera points to the zenith"
+                "a different site, near {lat:.0},{lon:.0} if the camera points to the zenith"
             ),
             Change::OrderOfDate => write!(
                 f,
-                "the date {} (its numbers in another order)",
+                "date {} (day, month and year reordered)",
                 self.date.to_iso()
             ),
             Change::Hours(hours) => {
@@ -115,7 +117,8 @@ impl fmt::Display for Proposal {
                 };
                 write!(
                     f,
-                    "a time {} h {word} ({}: a clock {} h {clock} UTC, or a longitude {:.0}° further {way})",
+                    "a time {} h {word} ({}; as if the clock were {} h {clock} UTC, or the longitude {:.0}° \
+                     farther {way})",
                     range_text(least, most),
                     self.date.to_iso(),
                     hours.abs(),
@@ -158,12 +161,14 @@ impl fmt::Display for PlaceTime {
             .collect();
         write!(
             f,
-            "the stars contradict the site or the time, and neither is used: {}; ",
+            "the stars contradict the site or the time, so neither is used: {}; ",
             reasons.join("; ")
         )?;
         let proposals: Vec<String> = self.proposals.iter().map(ToString::to_string).collect();
         match &proposals[..] {
-            [] => f.write_str("no single change of a sign, the time or the date resolves this"),
+            [] => {
+                f.write_str("no single change of a sign, the time or the date would resolve this")
+            }
             [only] => write!(f, "{only} would resolve this"),
             [others @ .., last] => write!(
                 f,
@@ -191,12 +196,13 @@ impl fmt::Display for Contradiction {
             ),
             Self::SunIsUp { altitude_rad } => write!(
                 f,
-                "the Sun would be at an altitude of {:.0}°, and the fainter stars could not be seen",
+                "the Sun would be at an altitude of {:.0}°, too high for the fainter stars to be visible",
                 altitude_rad * DEG_PER_RAD
             ),
             Self::Planets { missing, seen } => write!(
                 f,
-                "{} should be in the frame but is not, and a bright source that is not a star is where {} would be on another date",
+                "{} should be in the frame but is not; a bright source that is not a star is where {} would \
+                 be on another date",
                 missing.name(),
                 seen.name()
             ),

@@ -18,9 +18,9 @@ table_row! {
     FrameRow in "frames" {
         frame: String, "", "meta.id;meta.main", "name of the frame";
         status: String, "", "meta.code.status", "identified, not_identified or unread";
-        reason_code: String, "", "meta.code", "why it is not identified, as a code";
-        reason: String, "", "meta.note", "why it is not identified";
-        night: String, "", "time.epoch", "date of the evening before, in local mean time if the site is known";
+        reason_code: String, "", "meta.code", "code of the reason why the frame is not identified";
+        reason: String, "", "meta.note", "reason why the frame is not identified";
+        night: String, "", "time.epoch", "date of the evening before the frame, in local mean time if the site is known";
         t_min: Option<f64>, "d", "time.start;obs.exposure", "date of the frame as Modified Julian Date (UTC)";
         exposure_s: Option<f64>, "s", "time.duration;obs.exposure", "exposure";
         camera: String, "", "meta.id;instr", "name of the camera";
@@ -29,13 +29,13 @@ table_row! {
         row_order: String, "", "meta.code", "order of the rows in the file; y is counted from the top of the picture in either case";
         ra_deg: Option<f64>, "deg", "pos.eq.ra;meta.main", "right ascension of the center (ICRS)";
         dec_deg: Option<f64>, "deg", "pos.eq.dec;meta.main", "declination of the center (ICRS)";
-        s_fov: Option<f64>, "deg", "phys.angSize;instr.fov", "diameter of the circle around the frame";
+        s_fov: Option<f64>, "deg", "phys.angSize;instr.fov", "diameter of the circumscribed circle of the frame";
         s_region: String, "", "pos.outline;obs.field", "outline of the frame (STC-S, ICRS)";
         up_pa_deg: Option<f64>, "deg", "pos.posAng", "position angle of the picture's up direction";
-        qw: Option<f64>, "", "", "quaternion that turns ICRS vectors into camera axes, w";
-        qx: Option<f64>, "", "", "the same, x";
-        qy: Option<f64>, "", "", "the same, y";
-        qz: Option<f64>, "", "", "the same, z";
+        qw: Option<f64>, "", "", "quaternion that rotates ICRS vectors into camera axes: w component";
+        qx: Option<f64>, "", "", "quaternion that rotates ICRS vectors into camera axes: x component";
+        qy: Option<f64>, "", "", "quaternion that rotates ICRS vectors into camera axes: y component";
+        qz: Option<f64>, "", "", "quaternion that rotates ICRS vectors into camera axes: z component";
         sigma_x_arcsec: Option<f64>, "arcsec", "stat.error;pos", "standard error of the rotation about the x axis";
         sigma_y_arcsec: Option<f64>, "arcsec", "stat.error;pos", "standard error of the rotation about the y axis";
         sigma_roll_arcsec: Option<f64>, "arcsec", "stat.error;pos.posAng", "standard error of the rotation about the boresight";
@@ -44,7 +44,7 @@ table_row! {
         covariance_y_roll_arcsec2: Option<f64>, "arcsec**2", "stat.covariance;pos", "covariance of the rotations about the y axis and the boresight";
         fov_x_deg: Option<f64>, "deg", "phys.angSize;instr.fov", "horizontal field of view";
         fov_y_deg: Option<f64>, "deg", "phys.angSize;instr.fov", "vertical field of view";
-        focal_length_px: Option<f64>, "pix", "instr.param", "focal length over pixel pitch";
+        focal_length_px: Option<f64>, "pix", "instr.param", "focal length in pixels";
         mirrored: bool, "", "meta.code", "whether an identified frame mirrors the sky";
         detected: Option<u64>, "", "meta.number", "detections";
         matched: Option<u64>, "", "meta.number", "detections with the name of a star";
@@ -55,9 +55,9 @@ table_row! {
         zero_point_vmag: Option<f64>, "mag", "phot.mag;arith.zp", "V magnitude of a star with a flux of 1 unit, per second if the exposure is known";
         zero_point_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;arith.zp", "standard error of the zero point";
         limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude at which half of the stars are detected";
-        limit50_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limit";
+        limit50_sigma_mag: Option<f64>, "mag", "stat.error;phot.mag;em.opt.V", "standard error of the limiting magnitude";
         predicted_limit50_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;meta.modelled", "limiting magnitude predicted for the camera";
-        limit_difference_mag: Option<f64>, "mag", "phot.mag;arith.diff", "measured minus predicted limit";
+        limit_difference_mag: Option<f64>, "mag", "phot.mag;arith.diff", "measured minus predicted limiting magnitude";
         faintest_vmag: Option<f64>, "mag", "phot.mag;em.opt.V;stat.max", "V magnitude of the faintest named star";
         sky_mag_arcsec2: Option<f64>, "mag/arcsec**2", "phot.mag.sb;em.opt.V", "sky brightness";
         airmass: Option<f64>, "", "obs.airMass", "airmass of the center";

@@ -82,8 +82,8 @@ fn lens_of(document: &Document) -> Result<CvLens, FormatError> {
     if !(-0.5..=width_px).contains(&x) || !(-0.5..=height_px).contains(&y) {
         return Err(FormatError::Value {
             key: "camera_matrix",
-            found: format!("for an axis at ({x}, {y}) px"),
-            expected: "one on the frame of image_width and image_height",
+            found: format!("for an optical axis at ({x}, {y}) px"),
+            expected: "an axis within image_width and image_height",
         });
     }
     Ok(CvLens {
@@ -139,11 +139,11 @@ fn model_of(document: &Document, coefficients: &[f64]) -> Result<CvModel, Format
         }
     };
     let (is_good, expected) = match model {
-        CvModel::Fisheye => (count == 4, "4 of them for an equidistant lens"),
+        CvModel::Fisheye => (count == 4, "4 coefficients for an equidistant lens"),
         CvModel::Pinhole => (
             [0, 4, 5, 8, 12].contains(&count)
                 || count == 14 && coefficients[12..].iter().all(|tilt| *tilt == 0.0),
-            "4, 5, 8 or 12 of them, or 14 with a sensor that is not tilted",
+            "4, 5, 8 or 12 coefficients, or 14 for a sensor without tilt",
         ),
     };
     if is_good {

@@ -48,7 +48,7 @@ pub fn opencv_yaml_within(camera: &CameraModel, tolerance_px: f64) -> Result<Str
     let mut text = String::from("%YAML:1.0\n---\n");
     // Writing to a text does not fail.
     let _ = match lens.largest_px {
-        None => writeln!(text, "# Exactly the measured lens."),
+        None => writeln!(text, "# Represents the measured lens exactly."),
         Some(largest_px) => writeln!(
             text,
             "# Fitted to the measured lens; largest error on the frame: {largest_px:.4} px."
@@ -70,7 +70,7 @@ pub fn opencv_yaml_within(camera: &CameraModel, tolerance_px: f64) -> Result<Str
     let count = lens.coefficients.len();
     let key = "distortion_coefficients";
     write_matrix(&mut text, key, MATRIX, [1, count], &lens.coefficients);
-    text.push_str("# From starpipe's camera axes to OpenCV's.\n");
+    text.push_str("# Rotation from starpipe's camera axes to OpenCV's.\n");
     let to_lens: Vec<f64> = lens.camera_to_lens.transpose().iter().copied().collect();
     write_matrix(&mut text, "camera_to_lens", MATRIX, [3, 3], &to_lens);
     text.push_str("# The lens was measured up to this angle from the axis.\n");

@@ -255,8 +255,8 @@ impl PlateLens {
         };
         Err(FormatError::Value {
             key: "x_poly_rev",
-            found: format!("a distortion that images nothing at ({x:.0}, {y:.0}) px"),
-            expected: "one that does not fold the picture",
+            found: format!("a distortion without a solution at ({x:.0}, {y:.0}) px"),
+            expected: "a distortion that can be inverted all over the frame",
         })
     }
 

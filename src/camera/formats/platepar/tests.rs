@@ -196,7 +196,7 @@ fn what_rms_cannot_have_is_refused() {
     assert!(matches!(error, Err(FormatError::Unsuitable { .. })));
     let good = platepar(&camera, &pointing()).unwrap();
     for (from, to, expected) in [
-        ("\"JD\"", "\"no\"", "there is no 'JD'"),
+        ("\"JD\"", "\"no\"", "'JD' is missing"),
         ("radial", "conic", "'distortion_type' is 'conic"),
         ("1280", "-1", "'X_res' is -1"),
         ("{", "", "expected JSON"),

@@ -15,8 +15,8 @@ use std::path::PathBuf;
     starpipe validate --suite clutter --preset imx174-35mm\n  \
     starpipe validate --suite clutter --camera camera.toml --kinds sky --count 250 --format csv > clutter.csv\n  \
     starpipe validate --suite clutter --preset imx174-35mm --kinds foliage,jpeg --count 5 --pictures pictures\n\n\
-    Frames are simulated at random attitudes, clutter is drawn before the sky or into it, and they are\n\
-    processed without hints beforehand. Pictures of no sky are drawn, too: none may be identified.\n\
+    Frames are simulated at random attitudes, with clutter in front of the sky or in it, and processed\n\
+    without hints. Pictures without sky are processed, too; none of them should be identified.\n\
     Without --camera or --preset, every built-in camera is simulated in turn.\n\
     Kinds with sky: clean, foliage, edges, reflections, clouds, trails, false-stars, black-level, jpeg,\n\
     blends, hot-pixels, cosmic-rays;\n\
@@ -28,7 +28,7 @@ pub(crate) struct ClutterArgs {
     /// Seed of the random numbers
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Kinds of frames: all, sky, no-sky, or names with commas between them
+    /// Kinds of frames: all, sky, no-sky, or names separated by commas
     #[arg(long, value_name = "KIND,...", default_value = "all", value_parser = kinds)]
     pub(super) kinds: Kinds,
     /// Also write the first frames of each kind into this directory, as TIFF

@@ -70,7 +70,8 @@ fn introduction(protocol: &ClutterProtocol) -> String {
     format!(
         "{} frames of each kind, seed {}; {}, {} × {} px; no hints.\n\
          wrong frames: wrong pointing, or a picture without sky. false/Mpx: detections without a star, clutter included.\n\
-         wrong names: the star is not there, or is outshone by a nearer one; stated: sum of the stated probabilities.\n\n",
+         wrong names: no star is there, or a brighter one is nearer; stated: sum of the stated \
+         probabilities.\n\n",
         protocol.frames, protocol.seed, camera.name, camera.width_px, camera.height_px,
     )
 }

@@ -19,9 +19,9 @@ const MAX_BRIGHT_FALSE: i64 = 100_000;
     starpipe validate --suite robustness --count 10000 --stars 20 --format csv > robustness.csv\n  \
     starpipe validate --suite robustness --sweep centroid-error=0:5:11 --sweep false=0:200:9 --plot robustness.svg\n\n\
     Lists of centroids are drawn from the catalog, at attitudes uniform over all rotations, with errors, missing\n\
-    and false stars, and identified like those of `starpipe identify`. Without --sweep the table is the\n\
-    standard one: five fields of view, then one worse condition at a time in a field of 10 degrees,\n\
-    and wide fields of unknown size.")]
+    and false stars, and identified like those of `starpipe identify`. Without --sweep the standard\n\
+    table is computed: five fields of view, then a field of 10 degrees with one condition at a time made\n\
+    worse, and wide fields of unknown size.")]
 pub(crate) struct RobustnessArgs {
     /// Trials in each row of the table
     #[arg(long, alias = "trials", value_name = "NUMBER", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
@@ -31,7 +31,7 @@ pub(crate) struct RobustnessArgs {
     pub(super) seed: u64,
     #[command(flatten)]
     pub(super) protocol: ProtocolOptions,
-    /// Trials with fewer true stars than this count only if the answer is wrong
+    /// Trials with fewer true stars than this are counted only if the identification is wrong
     #[arg(long, value_name = "NUMBER", default_value_t = 8)]
     pub(super) least_true_stars: usize,
     /// Vary one parameter over COUNT values, in place of the standard table (fov, stars,
@@ -75,13 +75,13 @@ pub(super) struct ProtocolOptions {
     /// False stars, in percent of the true ones
     #[arg(long = "false", value_name = "PERCENT", default_value_t = 15.0, value_parser = values::multiple)]
     pub(super) false_stars: f64,
-    /// Further false stars, brighter than all true ones
+    /// Number of additional false stars, brighter than all true ones
     #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=MAX_BRIGHT_FALSE))]
     pub(super) bright_false: u32,
     /// Largest error of the stated field of view, in percent
     #[arg(long, value_name = "PERCENT", default_value_t = 10.0, value_parser = values::percent, conflicts_with = "scale_unknown")]
     pub(super) scale_error: f64,
-    /// State no field of view
+    /// Do not give the field of view
     #[arg(long)]
     pub(super) scale_unknown: bool,
     /// Which frames are mirrored
@@ -96,7 +96,7 @@ pub(super) struct ProtocolOptions {
 pub(super) enum MirroredArg {
     /// None
     Never,
-    /// Every second one, at random
+    /// Half of them, chosen at random
     Half,
     /// All
     Always,
