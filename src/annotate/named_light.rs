@@ -5,7 +5,6 @@ use super::view::View;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median_of;
 use crate::identify::SourceIndex;
-use crate::photometry::instrumental_mag;
 use crate::solve::Source;
 
 /// The detections, and what each is known to be.
@@ -27,7 +26,7 @@ impl<'a> Lights<'a> {
         let zero_points = sources
             .iter()
             .zip(&named_v_mag)
-            .filter_map(|(source, v_mag)| Some(f64::from((*v_mag)?) - mag_of(source)?));
+            .filter_map(|(source, v_mag)| Some(f64::from((*v_mag)?) - source.instrumental_mag()?));
         let zero_point_mag = median_of(zero_points);
         for seen in &view.solution.bodies {
             if let Some(source) = seen.source {
@@ -67,16 +66,11 @@ impl<'a> Lights<'a> {
     fn is_bright_enough(&self, source: &Source, v_mag: f32, why: Unmeasured) -> bool {
         /// Tone curves, clouds, and low altitudes make stars fainter by up to this.
         const FAINTER_MAG: f64 = 4.0;
-        let found = mag_of(source).zip(self.zero_point_mag);
+        let found = source.instrumental_mag().zip(self.zero_point_mag);
         let found = found.map(|(mag, zero_point_mag)| mag + zero_point_mag);
         let is_partial = matches!(why, Unmeasured::Saturated | Unmeasured::Extended);
         is_partial || found.is_none_or(|found| found < f64::from(v_mag) + FAINTER_MAG)
     }
-}
-
-/// The instrumental magnitude of a detection.
-fn mag_of(source: &Source) -> Option<f64> {
-    source.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
 }
 
 /// What a detection without a name says of the star whose light it is.

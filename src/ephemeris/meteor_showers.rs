@@ -6,15 +6,14 @@
 //! # Reference
 //! International Meteor Organization, Meteor Shower Calendar 2024, table 5 (the showers of which people speak).
 
+use super::OBLIQUITY_J2000_RAD;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::epoch::ObservationDate;
-use crate::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
+use crate::base::units::RAD_PER_DEG;
 use jiff::civil::Date;
 use nalgebra::{Rotation3, Vector3};
 
 const TABLE: &str = include_str!("../../assets/meteor-showers.csv");
-/// Obliquity of the ecliptic at J2000.0.
-const OBLIQUITY_RAD: f64 = 84_381.448 * RAD_PER_ARCSEC;
 /// How far a radiant moves along the ecliptic in a day.
 const DRIFT_RAD: f64 = RAD_PER_DEG;
 
@@ -47,7 +46,8 @@ fn radiant(row: &'static str, day: Date) -> Option<Radiant> {
         ra_deg.parse::<f64>().ok()? * RAD_PER_DEG,
         dec_deg.parse::<f64>().ok()? * RAD_PER_DEG,
     );
-    let pole = Rotation3::from_axis_angle(&Vector3::x_axis(), OBLIQUITY_RAD) * Vector3::z_axis();
+    let pole =
+        Rotation3::from_axis_angle(&Vector3::x_axis(), OBLIQUITY_J2000_RAD) * Vector3::z_axis();
     let drift = Rotation3::from_axis_angle(&pole, f64::from(days) * DRIFT_RAD);
     Some(Radiant {
         name,

@@ -9,3 +9,8 @@ pub(crate) mod meteor_showers;
 pub mod observer;
 pub mod places;
 pub mod solar_system;
+
+use crate::base::units::RAD_PER_ARCSEC;
+
+/// Obliquity of the ecliptic of J2000.0, that of VSOP87, which is turned by less than 0.1″ against the ICRS's.
+const OBLIQUITY_J2000_RAD: f64 = 84_381.448 * RAD_PER_ARCSEC;

@@ -67,8 +67,10 @@ pub fn svg(report: &FrameReport) -> Option<String> {
     let panels = PANELS.iter().filter_map(|panel| panel.draw(report, sky));
     let panels: Vec<Panel> = panels.collect();
     let abreast = panels.len();
-    let has_unmeasured =
-        |panel: &SkyPanel| sky.cells.iter().any(|cell| (panel.value)(cell).is_none());
+    let has_unmeasured = |panel: &SkyPanel| {
+        let is_known = |cell: &SkyCellReport| (panel.value)(cell).is_some();
+        sky.cells.iter().any(is_known) && !sky.cells.iter().all(is_known)
+    };
     let note = "Gray: not measured.".to_owned();
     let sheet = Sheet {
         title: title(report, sky),
@@ -171,8 +173,16 @@ fn frame(report: &FrameReport) -> Vec<PlotLayer> {
         note: star.label.clone(),
         ..Dot::from((star.x, star.y))
     };
-    let name_off = 0.035 * report.height as f64;
-    let name = |star: &AnnotationReport| (star.x, star.y - name_off, star.label.clone());
+    // A name is above its star, and within the frame.
+    let [wide, high] = [report.width, report.height].map(|side| side as f64);
+    let name = |star: &AnnotationReport| {
+        let x = star.x.clamp(0.14 * wide, 0.86 * wide);
+        (
+            x,
+            (star.y - 0.05 * high).max(0.04 * high),
+            star.label.clone(),
+        )
+    };
     let mut layers = vec![
         PlotLayer::guide(Marks::Line(outline)),
         PlotLayer::unnamed(

@@ -7,7 +7,6 @@ use crate::base::statistics::median_of;
 use crate::catalog::Catalog;
 use crate::ephemeris::solar_system::{Body, BodyKind, bodies_within};
 use crate::identify::{Identification, Priors, SourceIndex, StarMatch};
-use crate::photometry::instrumental_mag;
 use std::collections::HashMap;
 
 /// The largest radius of a body's disc: part of it may be in a frame whose corner it is beyond.
@@ -72,7 +71,8 @@ impl<'a> IdentifiedSources<'a> {
     fn new(found: &'a Identification, sources: &'a [Source], catalog: &Catalog) -> Self {
         let v_mag = |star| f64::from(catalog.star(star).v_mag);
         let named = found.matches.iter().map(|m| (m.source, v_mag(m.star)));
-        let of_match = |m: &StarMatch| Some(v_mag(m.star) - mag(&sources[m.source.get()])?);
+        let of_match =
+            |m: &StarMatch| Some(v_mag(m.star) - sources[m.source.get()].instrumental_mag()?);
         Self {
             found,
             sources,
@@ -123,7 +123,8 @@ impl<'a> IdentifiedSources<'a> {
         const STAR_FAINTER_MAG: f64 = 1.0;
         let source = &self.sources[index.get()];
         let is_saturated = source.measured.is_some_and(|m| m.flags.saturated);
-        let v_mag = mag(source)
+        let v_mag = source
+            .instrumental_mag()
             .zip(self.zero_point_mag)
             .map(|(mag, zero)| mag + zero);
         let fainter_mag = match body.kind {
@@ -134,11 +135,6 @@ impl<'a> IdentifiedSources<'a> {
         let star = self.named_v_mag.get(&index);
         is_bright && star.is_none_or(|star| *star > body.v_mag + STAR_FAINTER_MAG)
     }
-}
-
-/// Instrumental magnitude of a source whose flux is known.
-pub(super) fn mag(source: &Source) -> Option<f64> {
-    source.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
 }
 
 #[cfg(test)]

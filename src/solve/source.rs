@@ -3,6 +3,7 @@
 use crate::base::coords::PixelPoint;
 use crate::centroids::ListedCentroid;
 use crate::detect::{Detection, DetectionFlags};
+use crate::photometry::instrumental_mag;
 
 /// One source: a detection, or a line of a centroid list.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +29,13 @@ pub struct Measured {
     pub snr: f64,
     /// What is unusual about it.
     pub flags: DetectionFlags,
+}
+
+impl Source {
+    /// Its instrumental magnitude, if the flux is known.
+    pub(crate) fn instrumental_mag(&self) -> Option<f64> {
+        self.flux.filter(|flux| *flux > 0.0).map(instrumental_mag)
+    }
 }
 
 impl From<&Detection> for Source {

@@ -2,6 +2,7 @@
 
 use crate::common::{Ran, fixture, shared_dir, starpipe};
 use serde_json::Value;
+use std::collections::HashMap;
 use std::fs;
 use tempfile::tempdir;
 
@@ -112,4 +113,44 @@ fn bright_stars_of_real_frames_are_named_and_labeled_where_their_light_is() {
         labels > 150 && named as f64 >= NAMED_SHARE * bright as f64,
         "{named} of {bright}"
     );
+}
+
+#[test]
+fn labels_are_where_another_simulator_put_the_stars() {
+    let Some(shared) = shared_dir() else { return };
+    let folder = shared.join("frames/foreign");
+    let files = fs::read_dir(&folder).unwrap();
+    let mut frames: Vec<_> = files.map(|file| file.unwrap().path()).collect();
+    frames.retain(|path| {
+        // Stars drawn twice have two places.
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        path.extension().is_some_and(|extension| extension == "tif") && !name.contains("double")
+    });
+    frames.sort();
+    let mut labels = 0;
+    for (report, path) in reports(frames.clone()).iter().zip(&frames) {
+        let mut truth = csv::Reader::from_path(path.with_extension("csv")).unwrap();
+        let places: HashMap<String, [f64; 2]> = truth
+            .records()
+            .map(|row| {
+                let row = row.unwrap();
+                let place = [0, 1].map(|column| row[column].parse().unwrap());
+                (format!("SKYMAP {}", &row[4]), place)
+            })
+            .collect();
+        for star in of_kind(report, "star") {
+            let Some([x, y]) = star["id"].as_str().and_then(|id| places.get(id)) else {
+                continue;
+            };
+            labels += 1;
+            let off_px = (number(&star["x"]) - x).hypot(number(&star["y"]) - y);
+            let error_px = number(&star["uncertainty_px"]);
+            assert!(
+                off_px <= error_px,
+                "{}: {off_px} px, {star}",
+                path.display()
+            );
+        }
+    }
+    assert!(labels > 250, "{labels}");
 }

@@ -1,13 +1,11 @@
 //! Directions to the planets, by VSOP87.
 
 use super::body::{BodyKind, LIGHT_DAYS_PER_AU};
-use crate::base::units::RAD_PER_ARCSEC;
+use crate::ephemeris::OBLIQUITY_J2000_RAD;
 use nalgebra::Vector3;
 use vsop87::{RectangularCoordinates, vsop87a};
 
 const J2000_JD: f64 = 2_451_545.0;
-/// Obliquity of the ecliptic of VSOP87, which is turned by less than 0.1″ against the ICRS's.
-const OBLIQUITY_RAD: f64 = 84_381.448 * RAD_PER_ARCSEC;
 
 /// From the Sun to the Earth, in ICRS axes, `days` of terrestrial time after J2000.0.
 fn earth_au(days: f64) -> Vector3<f64> {
@@ -42,7 +40,7 @@ fn planet_au(kind: BodyKind, days: f64) -> Vector3<f64> {
 
 /// From the ecliptic of J2000.0 to the ICRS.
 fn icrs(ecliptic: &RectangularCoordinates) -> Vector3<f64> {
-    let (sin, cos) = libm::sincos(OBLIQUITY_RAD);
+    let (sin, cos) = libm::sincos(OBLIQUITY_J2000_RAD);
     Vector3::new(
         ecliptic.x,
         cos * ecliptic.y - sin * ecliptic.z,

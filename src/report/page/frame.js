@@ -181,17 +181,23 @@ const showFrame = (root, data) => {
     const taken = skyNames.map((node) => roomOf(Number(node.getAttribute("x")), Number(node.getAttribute("y")), node.textContent));
     const shown = byMagnitude.filter((star) => ringed.has(star) || star === chosen);
     const named = shown.filter((star) => star.name);
+    const rings = [...ringed].map((star) => { const r = radius(star) * u; return [star, [star.x - r, star.y - r, star.x + r, star.y + r]]; });
+    const areOverlapping = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
     for (const star of (named.length >= 5 ? named : shown).slice(0, 4 * MOST)) {
       if (taken.length >= MOST + skyNames.length) break;
       const text = star.label;
-      // To the left of its star where it would leave the picture.
-      const off = (radius(star) + 4) * u, wide = text.length * SIZE * 0.6 * u;
-      const isLeft = star.x + off + 0.88 * wide > box.x + box.w;
-      const at = [star.x + (isLeft ? -off : off), star.y + SIZE * 0.35 * u];
-      const room = roomOf(at[0] - (isLeft ? wide : 0), at[1], text);
-      if (taken.some((o) => o[0] < room[2] && room[0] < o[2] && o[1] < room[3] && room[1] < o[3])) continue;
-      taken.push(room);
-      make(layers.names, "text", { x: at[0], y: at[1], "text-anchor": isLeft ? "end" : "start", "font-size": SIZE * u, "stroke-width": 3 * u }, text);
+      const off = (radius(star) + 4) * u, wide = text.length * SIZE * 0.6 * u, level = star.y + SIZE * 0.35 * u;
+      // Beside its star, above or below it: where it stays in the picture, covers no name, and if possible no ring.
+      const places = [["start", star.x + off, level], ["end", star.x - off, level], ["middle", star.x, star.y - off], ["middle", star.x, star.y + off + SIZE * u]];
+      const fitting = places.map(([anchor, x, y]) => {
+        const room = roomOf(x - { start: 0, middle: wide / 2, end: wide }[anchor], y, text);
+        const isInside = room[0] > box.x && room[0] + 0.88 * wide < box.x + box.w && room[1] > box.y && room[3] < box.y + box.h;
+        return { anchor, x, y, room, isFree: isInside && !taken.some((other) => areOverlapping(room, other)) };
+      }).filter(({ isFree }) => isFree);
+      const place = fitting.find(({ room }) => !rings.some(([ringed, ring]) => ringed !== star && areOverlapping(room, ring))) ?? fitting[0];
+      if (!place) continue;
+      taken.push(place.room);
+      make(layers.names, "text", { x: place.x, y: place.y, "text-anchor": place.anchor, "font-size": SIZE * u, "stroke-width": 3 * u }, text);
     }
   };
   let frame = 0;

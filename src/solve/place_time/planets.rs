@@ -9,7 +9,6 @@ use crate::base::coords::{PixelPoint, UnitVector};
 use crate::base::statistics::median_of;
 use crate::base::units::RAD_PER_DEG;
 use crate::ephemeris::solar_system::{Body, BodyKind, TimeError, bodies_at};
-use crate::solve::bodies::mag;
 use crate::solve::body_in_frame::BodyInFrame;
 use std::collections::HashSet;
 
@@ -103,7 +102,8 @@ fn strangers(assessed: &Assessed) -> Vec<Stranger> {
         .map(|named| named.source.get())
         .collect();
     let stars = examination.sky.stars.iter();
-    let zero_points = stars.filter_map(|star| Some(star.v_mag - mag(&sources[star.source.get()])?));
+    let zero_points =
+        stars.filter_map(|star| Some(star.v_mag - sources[star.source.get()].instrumental_mag()?));
     let Some(zero_point) = median_of(zero_points) else {
         return Vec::new();
     };
@@ -114,7 +114,7 @@ fn strangers(assessed: &Assessed) -> Vec<Stranger> {
         !named.contains(at) && is_starlike
     });
     let strangers = unnamed.filter_map(|(_, source)| {
-        let v_mag = zero_point + mag(source)?;
+        let v_mag = zero_point + source.instrumental_mag()?;
         (v_mag < BRIGHT_V_MAG && assessed.is_high(&source.position)).then_some(Stranger {
             position: source.position,
             v_mag,
