@@ -204,8 +204,8 @@ mod tests {
     #[test]
     fn what_is_no_table_is_refused() {
         let refused = |bytes| NumberColumns::open(bytes).err().unwrap().to_string();
-        assert!(refused(b"no table").contains("the mark"));
-        assert!(refused(b"").contains("the mark"));
+        assert!(refused(b"no table").contains("the signature"));
+        assert!(refused(b"").contains("the signature"));
         assert!(refused(&BUILT_IN[..BUILT_IN.len() - 1]).contains("the end of a file"));
     }
 

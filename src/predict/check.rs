@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(
             error,
             "quantum_efficiency is known from 400 to 800 nm, which does not cover the band from 360 to 780 nm of the \
-             paper's reading"
+             paper's equations (reading paper)"
         );
         scenario.reading = Reading::Physical;
         assert_eq!(scenario.check(), Ok(()));

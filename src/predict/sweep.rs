@@ -84,7 +84,10 @@ pub enum SweepError {
     #[error(transparent)]
     Unknown(#[from] UnknownParameter),
     /// Fewer than two values, or too many.
-    #[error("the sweep has {count} values, expected 2 to {}", Sweep::MAX_VALUES)]
+    #[error(
+        "the number of sweep values is {count}, expected 2 to {}",
+        Sweep::MAX_VALUES
+    )]
     Count {
         /// Number of values.
         count: usize,
@@ -273,11 +276,11 @@ mod tests {
             ),
             (
                 sweep("aperture_mm", 5.0, 200.0, 1),
-                "the sweep has 1 values, expected 2 to 1000",
+                "the number of sweep values is 1, expected 2 to 1000",
             ),
             (
                 sweep("aperture_mm", 5.0, 200.0, 1001),
-                "a sweep of 1001 values",
+                "the number of sweep values is 1001",
             ),
             (
                 sweep("aperture_mm", -5.0, 200.0, 3),

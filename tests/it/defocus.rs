@@ -249,7 +249,7 @@ fn nonsensical_options_are_refused_before_any_work() {
         (&["--count", "0"], "0 is not in 1..="),
         (
             &["--radius-px", "1:1:1"],
-            "the sweep has 1 values, expected 2 to 1000",
+            "the number of sweep values is 1, expected 2 to 1000",
         ),
         (&["--radius-px", "1:1:5"], "expected increasing values"),
         (&["--radius-px", "0.01:1:5"], "expected 0.1 to 5 px"),

@@ -588,7 +588,7 @@ fn equivalent_options_exclude_each_other() {
 fn nonsensical_sweeps_are_refused_before_anything_is_printed() {
     for (sweep, expected) in [
         ("aperture_mm=200:5:10", "the sweep runs from 200 to 5"),
-        ("aperture_mm=5:200:1", "the sweep has 1 values"),
+        ("aperture_mm=5:200:1", "the number of sweep values is 1"),
         ("aperture_mm=5:200:1001", "expected 2 to 1000"),
         (
             "aperture_mm=5:200:99999999999999999999",

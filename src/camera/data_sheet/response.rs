@@ -65,7 +65,7 @@ pub enum ResponseError {
         before_nm: f64,
     },
     /// There are fewer than two rows.
-    #[error("{}: {found} rows of wavelength and value, expected two or more", path.display())]
+    #[error("{}: too few rows of wavelength and value: found {found}, expected two or more", path.display())]
     TooShort {
         /// The file.
         path: PathBuf,
@@ -270,17 +270,20 @@ mod tests {
             ),
             (
                 "nm,qe\n400,1.2\n500,0.3\n",
-                "line 2: '1.2' where a value from 0 to 1",
+                "line 2: found '1.2', expected a value from 0 to 1",
             ),
-            ("nm,qe\n400,NaN\n500,0.3\n", "line 2: 'NaN'"),
+            ("nm,qe\n400,NaN\n500,0.3\n", "line 2: found 'NaN'"),
             (
                 "nm,qe\n-5,0.1\n500,0.3\n",
-                "line 2: '-5' where a wavelength",
+                "line 2: found '-5', expected a wavelength",
             ),
-            ("nm,qe\n400,0.2\n", "1 rows of wavelength and value"),
+            (
+                "nm,qe\n400,0.2\n",
+                "too few rows of wavelength and value: found 1",
+            ),
             (
                 "nm;qe\n400;0.2\n500;0.3\n",
-                "line 2: '400;0.2' where a wavelength in nanometers, before a comma, was",
+                "line 2: found '400;0.2', expected a wavelength in nanometers, before a comma",
             ),
         ] {
             let error = parsed(text).unwrap_err().to_string();

@@ -53,7 +53,7 @@ fn each_kind_of_damage_has_its_message() {
         bytes[at] = value;
         bytes
     };
-    expect_error(&with(0, b'x'), "the mark");
+    expect_error(&with(0, b'x'), "the signature");
     expect_error(&with(8, 3), "version 3");
     expect_error(&with(8, 2), "identifiers of");
     expect_error(&with(12, 200), "200 stars");

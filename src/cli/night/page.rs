@@ -27,7 +27,7 @@ pub(super) fn build(
     Ok(PageContent {
         title: match summary.first_date.as_str() {
             "" => "A night".to_owned(),
-            date => format!("Night of {date}"),
+            date => format!("Night of {}", date.split('T').next().unwrap_or(date)),
         },
         question: "How was the night?".to_owned(),
         answer: text::answer(summary),

@@ -126,21 +126,28 @@ pub(super) struct ShownMedian {
 pub(super) fn medians(night: &NightSummary) -> impl Iterator<Item = ShownMedian> {
     let of = &night.median;
     let cloud_percent = of.cloud_share.map(|share| 100.0 * share);
-    let extinction = of.extinction_mag_per_airmass;
+    let mag = |value: Option<f64>, unit: &str| Some(format!("{:.2} {unit}", value?));
     let all = [
-        ("zenith", of.zenith_mag_arcsec2, "mag/arcsec²"),
-        ("limit", of.limit_vmag, "V"),
+        ("zenith", mag(of.zenith_mag_arcsec2, "mag/arcsec²")),
+        ("limit", of.limit_vmag.map(|limit| format!("V {limit:.2}"))),
         (
             "measured minus expected limit",
-            of.limit_difference_mag,
-            "mag",
+            mag(of.limit_difference_mag, "mag"),
         ),
-        ("extinction", extinction, "mag per airmass"),
-        ("clouds", cloud_percent, "%"),
+        (
+            "extinction",
+            mag(of.extinction_mag_per_airmass, "mag per airmass"),
+        ),
+        (
+            "cloud cover",
+            cloud_percent.map(|percent| format!("{percent:.0} %")),
+        ),
     ];
-    let shown = |(name, value, unit): (&'static str, Option<f64>, &str)| {
-        let value = format!("{:.2} {unit}", value?);
-        Some(ShownMedian { name, value })
+    let shown = |(name, value): (&'static str, Option<String>)| {
+        Some(ShownMedian {
+            name,
+            value: value?,
+        })
     };
     all.into_iter().filter_map(shown)
 }

@@ -248,6 +248,6 @@ mod tests {
         small.grid.spots_px.truncate(4);
         small.points.truncate(400);
         let error = Surface::fit(&small).unwrap_err().to_string();
-        assert!(error.ends_with("found 4 x 100"), "{error}");
+        assert!(error.ends_with("found 4 and 100"), "{error}");
     }
 }

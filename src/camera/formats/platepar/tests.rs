@@ -188,7 +188,7 @@ fn what_is_written_is_read_again() {
 fn what_rms_cannot_have_is_refused() {
     let camera = CameraModel::pinhole(1280.0, 720.0, 1500.0, true);
     let error = platepar(&camera, &pointing()).unwrap_err().to_string();
-    let expected = "a platepar is for images that are not mirrored; this one is mirrored";
+    let expected = "a platepar only supports images that are not mirrored; this one is mirrored";
     assert_eq!(error, expected);
     let camera = CameraModel::pinhole(1280.0, 720.0, 1500.0, false);
     let date = "2024-01-01".parse().unwrap();
