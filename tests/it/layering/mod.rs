@@ -96,14 +96,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "annotate",
-        &[
-            "base",
-            "catalog",
-            "ephemeris",
-            "identify",
-            "photometry",
-            "solve",
-        ],
+        &["base", "catalog", "ephemeris", "identify", "solve"],
     ),
     (
         "report",
