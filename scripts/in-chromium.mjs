@@ -71,10 +71,13 @@ export const zoom = async (page, whileZoomed = async () => {}) => {
 /** Opens all that is folded. */
 export const unfold = (page) => page.evaluate(() => { for (const fold of document.querySelectorAll("details")) fold.open = true; });
 
-/** A layer of the sky is hidden until it is wanted. */
+/** Constellations are drawn at first, other layers of the sky when they are wanted. */
 export const showLayer = async (page, layer) => {
-  const lines = page.locator(`#view .${layer} path`).first();
-  check(!(await lines.isVisible()), `${layer} is shown before it is wanted`);
-  await page.locator(`[data-layer=${layer}]`).check();
+  const lines = page.locator(`#view .${layer} path`).first(), box = page.locator(`[data-layer=${layer}]`);
+  const isFirst = layer === "constellations";
+  check((await lines.isVisible()) === isFirst, `${layer} is ${isFirst ? "not shown" : "shown"} at first`);
+  await box.uncheck();
+  check(!(await lines.isVisible()), `${layer} is not hidden`);
+  await box.check();
   check(await lines.isVisible(), `${layer} is not shown`);
 };

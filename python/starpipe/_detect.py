@@ -67,12 +67,12 @@ class Detections:
 
     @property
     def x(self) -> NDArray[np.float64]:
-        """x (column) coordinates of the centroids, in pixels."""
+        """Column (x) coordinates of the centroids, in pixels."""
         return self.columns["x"]
 
     @property
     def y(self) -> NDArray[np.float64]:
-        """y (row) coordinates of the centroids, in pixels."""
+        """Row (y) coordinates of the centroids, in pixels."""
         return self.columns["y"]
 
     @property

@@ -224,7 +224,7 @@ class Pipeline:
     ) -> Iterator[Result]:
         """Solve many frames on several threads; results come in the order of the images.
 
-        Images are read as results are consumed; at most 2 × `threads` are in progress.
+        Images are read as results are consumed; at most twice `threads` are in progress.
 
         Parameters
         ----------

@@ -101,7 +101,7 @@ def test_advice_names_keywords(pipeline, pixels, result):
         ({"x": [1.0, 2.0], "y": [1.0]}, "of one length, not"),
         ({"x": [1.0], "y": [1.0], "error": 0.0}, "error must be above 0"),
         ({"x": [[1.0]], "y": [[1.0]]}, "of one length, not"),
-        ({"x": [1.0], "y": [1.0], "mag": [1.0]}, "flux or as mag"),
+        ({"x": [1.0], "y": [1.0], "mag": [1.0]}, "flux and mag are alternatives"),
     ],
 )
 def test_wrong_lists_are_refused(pipeline, arguments, message):

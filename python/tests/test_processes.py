@@ -173,6 +173,6 @@ def test_more_threads_than_help_are_not_started(pipeline, pixels, result):
 
 def test_centroids_have_a_time_limit(pipeline):
     started = time.perf_counter()
-    with pytest.raises(TimeoutError, match="within the time limit per frame; see time_limit"):
+    with pytest.raises(TimeoutError, match="reached the time limit per frame; see time_limit"):
         pipeline.identify(**_false_stars(), time_limit=0.05)
     assert time.perf_counter() - started < 1.0

@@ -134,7 +134,7 @@ def test_the_best_radius_is_the_programs(program, camera):
         (lambda: sp.limit("no-such.toml"), "no-such.toml"),
         (lambda: sp.limit(CAMERA, pitch_x_um=5.0, pixel_area_um2=9.0), "set the same quantity"),
         (lambda: sp.simulate(CAMERA, ra=3.0), "ra and dec belong together"),
-        (lambda: sp.simulate(CAMERA, dark=True, ra=1.0, dec=2.0), "shows the sky"),
+        (lambda: sp.simulate(CAMERA, dark=True, ra=1.0, dec=2.0), "are alternatives: give one"),
         (lambda: sp.simulate(CAMERA, flat=-1.0), "flat must be at least 0 electron, not -1"),
         (lambda: sp.simulate(CAMERA, read_noise_e=-1.0), "read_noise_e is -1"),
         (lambda: sp.detect(np.zeros((2, 2))), "2 "),

@@ -161,7 +161,7 @@ mod tests {
         summary.reasons.insert("no_match", 2);
         summary.limits_vmag = vec![6.0, 8.0, 7.0];
         let text = summary.text(&tally);
-        let expected = "\n10 frames: 7 identified, 2 no_match, 1 not read, median limit V 7.00, ";
+        let expected = "\n10 frames: 7 identified, 2 no_match, 1 unreadable, median limit V 7.00, ";
         assert!(text.starts_with(expected), "{text}");
     }
 }
