@@ -74,7 +74,11 @@ fn without_a_terminal_on_standard_error_there_is_no_bar() {
 #[test]
 fn a_table_is_as_wide_as_the_terminal() {
     for (columns, name) in [(60, "…n/orion.png"), (70, "…tures/orion/orion.png")] {
-        let Some(shown) = shown(&format!("stty cols {columns} rows 24;"), "table", "2>/dev/null") else {
+        let Some(shown) = shown(
+            &format!("stty cols {columns} rows 24;"),
+            "table",
+            "2>/dev/null",
+        ) else {
             return;
         };
         let lines = plain_lines(&shown);
