@@ -105,6 +105,17 @@ async function printed(page, name) {
   check(pdf.length > 1000, `${name} is not printed`);
 }
 
+/** A click in a drawing tells the value that is there. */
+async function tellValues(page) {
+  const isTouched = await page.evaluate(() => {
+    const title = document.querySelector(".drawing svg * > title");
+    title?.parentNode.dispatchEvent(new MouseEvent("click", { bubbles: true }));
+    return Boolean(title);
+  });
+  if (!isTouched) return;
+  check((await page.locator(".told").first().textContent()) !== "", "a touched value is not told");
+}
+
 const browser = await launch();
 for (const file of words) {
   const name = path.basename(file, ".html");
@@ -122,6 +133,7 @@ for (const file of words) {
     if (await page.locator("#view").count()) await useFrame(page, shots && colorScheme === "dark" ? path.join(shots, `${name}-zoomed.png`) : null);
     await useTables(page);
     await unfold(page);
+    await tellValues(page);
     await accessible(page, name);
     if (colorScheme === "dark") await printed(page, name);
     await page.close();

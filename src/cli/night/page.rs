@@ -13,7 +13,7 @@ pub(super) fn build(
     csv: &str,
 ) -> anyhow::Result<PageContent> {
     let figure = night::svg(rows, summary).map(|svg| PageFigure {
-        caption: "The night; point at a frame to see its values".to_owned(),
+        caption: "The night; point at a dot, or touch it, to see its values".to_owned(),
         svg,
         is_wide: true,
         is_colored: true,
