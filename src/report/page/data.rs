@@ -76,15 +76,15 @@ impl<'a> StarColumns<'a> {
 impl<'a> PageData<'a> {
     /// The numbers of a frame.
     pub(super) fn new(report: &'a FrameReport, solution: &Solution, catalog: &Catalog) -> Self {
-        let offsets = offsets(solution);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));
         let unlike = |(_, star): &(usize, &StarReport)| !star.is_star_like();
         let numbered = report.stars.iter().enumerate();
         let unlike_stars = numbered.filter(unlike).map(|(number, _)| number).collect();
         let mut stars = StarColumns::default();
-        let matches = solution.matches_by_source();
-        for ((star, offset), found) in report.stars.iter().zip(offsets).zip(matches) {
+        let sources = solution.sources.iter().zip(solution.matches_by_source());
+        for (star, (source, found)) in report.stars.iter().zip(sources) {
+            let offset = offset(solution, source, found);
             stars.add(star, offset, found.map(|found| catalog.label(found.star)));
         }
         Self {
@@ -103,14 +103,10 @@ impl<'a> PageData<'a> {
     }
 }
 
-/// Observed minus predicted positions of the identified stars, in the order of the detections.
-fn offsets(solution: &Solution) -> Vec<Option<[f64; 2]>> {
-    let identified = solution.outcome.identification();
-    let offset = |(source, star_match): (&Source, Option<&StarMatch>)| {
-        let predicted = identified?.pixel_of(&star_match?.light)?;
-        let observed = source.position;
-        Some([observed.x - predicted.x, observed.y - predicted.y])
-    };
-    let matches = solution.matches_by_source();
-    solution.sources.iter().zip(matches).map(offset).collect()
+/// Observed minus predicted position of an identified star, in pixels.
+fn offset(solution: &Solution, source: &Source, found: Option<&StarMatch>) -> Option<[f64; 2]> {
+    let identified = solution.outcome.identification()?;
+    let predicted = identified.pixel_of(&found?.light)?;
+    let observed = source.position;
+    Some([observed.x - predicted.x, observed.y - predicted.y])
 }
