@@ -6,6 +6,7 @@ pub mod coords;
 pub(crate) mod differences;
 pub mod epoch;
 pub(crate) mod exponential;
+pub(crate) mod file_ranges;
 pub mod files;
 pub mod format;
 pub mod interrupt;

@@ -1,6 +1,7 @@
 //! Errors of catalogue files.
 
 use super::StarId;
+use super::deep::Damage;
 use crate::base::format::excerpt;
 use std::path::{Path, PathBuf};
 use std::{fmt, io};
@@ -134,6 +135,15 @@ pub enum CatalogError {
         path: PathBuf,
         /// The damage.
         error: CompactError,
+    },
+    /// A file of another program's catalogue is damaged, or could not be read.
+    #[error("the catalog {}: {error}", path.display())]
+    Deep {
+        /// The file.
+        path: PathBuf,
+        /// The damage.
+        #[source]
+        error: Damage,
     },
     /// A star has a value that the compact form cannot hold.
     #[error("star {id}: {quantity} is {value}, expected {expected}")]

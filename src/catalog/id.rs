@@ -1,5 +1,6 @@
 //! Identifiers of catalogue stars.
 
+use super::PlaceId;
 use std::fmt;
 
 /// The identifier of a star, unique within a catalogue.
@@ -25,6 +26,8 @@ pub enum StarId {
     Named(u32),
     /// Gaia's `source_id`; printed as `GAIA 4472832130942575872`.
     Gaia(u64),
+    /// A star that has only a place, as in `J053516.47-052323.1`.
+    Place(PlaceId),
 }
 
 impl fmt::Display for StarId {
@@ -36,6 +39,7 @@ impl fmt::Display for StarId {
             Self::Number(number) => write!(f, "ID {number}"),
             Self::Named(number) => write!(f, "named star {number}"),
             Self::Gaia(number) => write!(f, "GAIA {number}"),
+            Self::Place(id) => write!(f, "{id}"),
         }
     }
 }
@@ -50,6 +54,7 @@ impl StarId {
             Self::Number(number) => (3, number),
             Self::Named(number) => (4, number as u64),
             Self::Gaia(number) => (5, number),
+            Self::Place(id) => (6, id.packed()),
         }
     }
 
@@ -63,12 +68,13 @@ impl StarId {
             3 => Some(Self::Number(value)),
             4 => small().map(Self::Named),
             5 => Some(Self::Gaia(value)),
+            6 => PlaceId::from_packed(value).map(Self::Place),
             _ => None,
         }
     }
 
     /// Parses an identifier with its catalogue: `SKYMAP 02480053`, `TYC 1-13-1`, `HIP 11767`, `HIP
-    /// 12318B`, `GAIA 4472832130942575872`, `ID 7`.
+    /// 12318B`, `GAIA 4472832130942575872`, `J053516.47-052323.1`, `ID 7`.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let number_of = |catalog: &str| {
             let (start, number) = text.split_at_checked(catalog.len())?;
@@ -84,6 +90,8 @@ impl StarId {
             u32::try_from(number).ok().map(Self::Skymap)
         } else if let Some(number) = number_of("GAIA ") {
             whole_number(number.as_bytes()).map(Self::Gaia)
+        } else if let Some(place) = PlaceId::parse(text) {
+            Some(Self::Place(place))
         } else {
             whole_number(number_of("ID ")?.as_bytes()).map(Self::Number)
         }

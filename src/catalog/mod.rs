@@ -47,17 +47,21 @@ mod bayer;
 pub(crate) mod boundaries;
 mod compact;
 mod contents;
+pub mod deep;
 mod error;
+mod gaia;
 mod id;
 mod import;
 mod numbers;
 #[cfg(feature = "overlay")]
 pub(crate) mod objects;
+mod place_id;
 mod position;
 mod proper_names;
 mod read;
 #[doc(hidden)]
 pub mod sky2000;
+pub(crate) mod sky_cells;
 #[doc(hidden)]
 pub mod sky_grid;
 mod star;
@@ -70,6 +74,7 @@ pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};
 pub use import::{ImportSummary, LoadedCatalog, SourceFile};
 pub use numbers::StarNumbers;
+pub use place_id::PlaceId;
 pub use read::read_until;
 pub use read::{import, read};
 pub use star::{Star, StarFlags, StarIndex};

@@ -207,7 +207,7 @@ fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, C
 }
 
 /// The files in a directory that are not hidden, by name.
-fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
+pub(super) fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
     let list = || -> io::Result<Vec<PathBuf>> {
         let paths = fs::read_dir(path)?.map(|entry| Ok(entry?.path()));
         let mut files = paths.collect::<io::Result<Vec<PathBuf>>>()?;

@@ -32,6 +32,8 @@ pub struct FrameMetadata {
     pub site: Option<Site>,
     /// Zenith distance that the mount reported, in degrees.
     pub zenith_distance_deg: Option<f64>,
+    /// Right ascension and declination to which the mount says that it points, in degrees.
+    pub pointing_deg: Option<[f64; 2]>,
     /// Which image of the file it is, where it is not the first.
     pub choice: Option<ImageChoice>,
     /// The mosaic of color filters that the file states. Drivers of grey cameras state one, too.

@@ -45,6 +45,7 @@ pub use identification::MIN_STARS;
 pub(crate) use identification::UnknownCentre;
 pub use identification::{Identification, SearchFailure, StarMatch};
 pub use index::IndexedCatalog;
+pub(crate) use index::SearchedPart;
 pub use index::{CacheError, cache_directory};
 pub use predict::{PredictedStar, SkyView};
 pub use priors::{

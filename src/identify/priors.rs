@@ -38,6 +38,8 @@ pub struct Priors {
     pub scale: Option<ScalePrior>,
     /// The boresight lies in this region of the sky.
     pub near: Option<SkyRegion>,
+    /// The mount says that it does: tried first in deep catalogues, and dropped where nothing matches.
+    pub mount: Option<SkyRegion>,
     /// When the frame was taken.
     pub date: Option<FrameDate>,
     /// Where it was taken.
@@ -57,6 +59,18 @@ pub struct SkyRegion {
     pub centre: UnitVector<Icrs>,
     /// Its radius, in radians.
     pub radius_rad: f64,
+}
+
+impl SkyRegion {
+    /// The region around the right ascension and declination to which a mount says that it points: alignment and
+    /// precession since J2000 count for less than a degree, the sides of a meridian flip for more.
+    pub fn of_mount([ra_deg, dec_deg]: [f64; 2]) -> Self {
+        const RADIUS_RAD: f64 = 2.5 * RAD_PER_DEG;
+        Self {
+            centre: UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG),
+            radius_rad: RADIUS_RAD,
+        }
+    }
 }
 
 /// The camera's scale with a tolerance.

@@ -1,5 +1,6 @@
 //! What the stages need and what does not change from frame to frame.
 
+use super::deep::DeepSky;
 use super::fixed_camera::FixedCamera;
 use super::pointing_buffers::PointingBuffers;
 use super::stopwatch::Stage;
@@ -12,7 +13,7 @@ use crate::detect::{self, DetectConfig};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::{self, Frame};
 use crate::identify::{
-    self, DateSource, Effort, FrameDate, IndexedCatalog, NAME_ODDS, Priors, ScalePrior,
+    self, DateSource, Effort, FrameDate, IndexedCatalog, NAME_ODDS, Priors, ScalePrior, SkyRegion,
 };
 use crate::photometry::comparison::ObservingSetup;
 use std::path::Path;
@@ -29,6 +30,8 @@ pub const DEFAULT_TIME_LIMIT_S: f64 = 60.0;
 pub struct Context<'a> {
     /// The catalogue's stars and their triangles.
     pub indexed: &'a IndexedCatalog<'a>,
+    /// Deep catalogues for fields that are too narrow for it.
+    pub deep: Option<&'a DeepSky>,
     /// How to detect stars.
     pub detect: DetectConfig,
     /// What is known of every frame beforehand.
@@ -75,6 +78,7 @@ impl<'a> Context<'a> {
     pub fn new(indexed: &'a IndexedCatalog<'a>) -> Self {
         Self {
             indexed,
+            deep: None,
             detect: DetectConfig::default(),
             priors: Priors::default(),
             camera: None,
@@ -93,6 +97,15 @@ impl<'a> Context<'a> {
             as_stored: false,
             time_limit: None,
             on_stage: None,
+        }
+    }
+
+    /// The same over the stars of a deep catalogue.
+    pub(super) fn over<'b>(&'b self, indexed: &'b IndexedCatalog<'static>) -> Context<'b> {
+        Context {
+            indexed,
+            deep: None,
+            ..self.clone()
         }
     }
 
@@ -126,6 +139,7 @@ impl<'a> Context<'a> {
                 .or(lens.map(ScalePrior::of_lens))
                 .or(camera_scale.map(ScalePrior::of_camera))
                 .or(header_scale),
+            mount: header.pointing_deg.map(SkyRegion::of_mount),
             site: priors.site.or(header.site),
             exposure_s: priors.exposure_s.or(header.exposure_s),
             ..priors
@@ -178,6 +192,8 @@ pub struct Workspace {
     pub identify: identify::Workspace,
     pub(super) pointing: PointingBuffers,
     interrupt: Interrupt,
+    /// Also due at the deadline of the frame.
+    pub(super) of_frame: Interrupt,
 }
 
 impl Workspace {
@@ -240,7 +256,8 @@ impl Workspace {
         };
         self.frames.set_interrupt(interrupt.clone());
         self.detect.set_interrupt(interrupt.clone());
-        self.identify.set_interrupt(interrupt);
+        self.identify.set_interrupt(interrupt.clone());
+        self.of_frame = interrupt;
     }
 }
 

@@ -109,6 +109,7 @@ impl SolveOptions {
                     radius_rad: self.radius_deg * RAD_PER_DEG,
                 }
             }),
+            mount: None,
             date: self
                 .date
                 .map(|date| FrameDate::stated(date, DateSource::User)),

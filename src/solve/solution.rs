@@ -7,17 +7,19 @@ use super::place_time::PlaceTime;
 use super::source::Source;
 use super::stopwatch::Timing;
 use crate::calibration::Applied;
-use crate::catalog::StarIndex;
+use crate::catalog::{Catalog, StarIndex};
 use crate::detect::{SkyArea, Trail};
 use crate::ephemeris::observer::{Observation, Site};
 use crate::ephemeris::places::AttitudeFrame;
 use crate::frame::RowOrder;
 use crate::identify::fit::MeasuredStar;
 use crate::identify::lens::{LensFrame, Unfit};
-use crate::identify::{FrameDate, Identification, SourceIndex, StarMatch};
+use crate::identify::{FrameDate, Identification, IndexedCatalog, SourceIndex, StarMatch};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::Comparison;
 use crate::sky::SkyMap;
+use std::fmt;
+use std::sync::Arc;
 
 /// What was found in one frame, or in one list of centroids.
 #[derive(Debug, Clone)]
@@ -65,6 +67,8 @@ pub struct Solution {
     pub photometry: Option<FramePhotometry>,
     /// The sky at each place of an identified frame, where it was wanted.
     pub sky: Option<SkyMap>,
+    /// The stars that the frame's are, where it took a deep catalogue.
+    pub(super) deep: Option<SolvedSky>,
     /// Comparison with the stated camera, where there is one and the exposure is known.
     pub comparison: Option<Comparison>,
     /// Gain of the stated camera, in electrons per ADU.
@@ -75,7 +79,24 @@ pub struct Solution {
     pub timing: Timing,
 }
 
+/// The stars around a frame, of a deep catalogue.
+#[derive(Clone)]
+pub(super) struct SolvedSky(pub Arc<IndexedCatalog<'static>>);
+
+impl fmt::Debug for SolvedSky {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("SolvedSky")
+            .field(&self.0.catalog().title())
+            .finish()
+    }
+}
+
 impl Solution {
+    /// The catalogue that its stars are of: `usual`, which frames are solved with, unless it took a deep one.
+    pub fn catalog<'a>(&'a self, usual: &'a Catalog) -> &'a Catalog {
+        self.deep.as_ref().map_or(usual, |deep| deep.0.catalog())
+    }
+
     /// One source.
     ///
     /// # Panics

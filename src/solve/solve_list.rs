@@ -2,11 +2,12 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
+use super::deep::{Answered, identify_in_all};
 use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
 use super::note::Note;
 use super::outcome::Outcome;
 use super::place_time::{ConfirmedPlaceTime, settle};
-use super::solution::Solution;
+use super::solution::{Solution, SolvedSky};
 use super::source::Source;
 use super::stopwatch::{Stage, Stopwatch};
 use crate::base::size::Size;
@@ -81,23 +82,30 @@ pub fn solve_centroids(
     let [width, height] = frame.size.sides();
     let priors = &priors_of(frame.size, context);
     let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
-    let catalog = context.indexed.catalog();
-    let mut identify = |places| {
-        let field = list.star_field_in(frame.size, places);
-        let workspace = &mut workspace.identify;
-        let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
-        identified(found, None, &field, priors, context.indexed)
-    };
-    let answer = through_air_or_not(priors.places(), &mut identify);
-    let known = (priors, context.utc_offset);
+    let interrupt = workspace.of_frame.clone();
+    let known = (context, priors);
+    let (answer, deep) = identify_in_all(known, frame.size, &interrupt, |context, priors| {
+        let mut identify = |places| {
+            let field = list.star_field_in(frame.size, places);
+            let workspace = &mut workspace.identify;
+            let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
+            identified(found, None, &field, priors, context.indexed)
+        };
+        let answer = through_air_or_not(priors.places(), &mut identify);
+        let known = (priors, context.utc_offset);
+        let sky = (&sources[..], context.indexed.catalog());
+        settle(answer, known, sky, |places| {
+            through_air_or_not(places, &mut identify)
+        })
+    });
     let ConfirmedPlaceTime {
         mut outcome,
         priors,
         place_time,
         ..
-    } = settle(answer, known, (&sources, catalog), |places| {
-        through_air_or_not(places, &mut identify)
-    });
+    } = answer;
+    let usual = context.indexed.catalog();
+    let catalog = deep.as_ref().map_or(usual, |deep| deep.catalog());
     let priors = &priors;
     let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
         list.star_field_in(frame.size, priors.places())
@@ -121,13 +129,13 @@ pub fn solve_centroids(
     let notes = notes.chain(Note::of_residuals(outcome.identification()));
     let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
     let notes = notes.chain(Note::of_lens(context.lens.as_deref(), &outcome));
-    let notes = notes.chain(Note::of_date(priors, &outcome));
+    let notes = notes.chain(Note::of_date(priors, &outcome)).collect();
     Ok(Solution {
         width,
         height,
         row_order: None,
         date: priors.date,
-        notes: notes.collect(),
+        notes,
         observation,
         place_time,
         site: priors.site,
@@ -142,10 +150,21 @@ pub fn solve_centroids(
         bodies,
         photometry: None,
         sky: None,
+        deep: deep.map(SolvedSky),
         trails: None,
         comparison: None,
         gain_e_per_adu: None,
         calibration: None,
         timing: clock.timing(),
     })
+}
+
+impl Answered for ConfirmedPlaceTime {
+    fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
+    fn outcome_mut(&mut self) -> &mut Outcome {
+        &mut self.outcome
+    }
 }

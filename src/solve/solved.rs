@@ -242,6 +242,7 @@ impl SolvedFrame<'_> {
             trails: self.trails,
             photometry: self.photometry,
             sky: self.sky,
+            deep: None,
             comparison,
             gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
             calibration: self.calibration.map(Calibration::applied),

@@ -2,6 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
+use super::deep::{Answered, identify_in_all};
 use super::error::Error;
 use super::explanation::explained;
 use super::identification::{SecondImages, identify_stars, observation, through_air_or_not};
@@ -12,12 +13,13 @@ use super::pointing::search_at_once;
 use super::pointing_buffers::{TRIED_CHOICES, TRIED_STARS};
 use super::prepared::Prepared;
 use super::raw_color::RawColor;
-use super::solution::Solution;
+use super::solution::{Solution, SolvedSky};
 use super::solved::SolvedFrame;
 use super::source::Source;
 use super::star_field::star_field;
 use super::stopwatch::{Stage, Stopwatch, Timing};
 use crate::base::panics::caught;
+use crate::base::size::Size;
 use crate::calibration::Calibration;
 use crate::detect::{
     self, DetectConfig, DetectError, Detections, Trail, look_for_brightest, measure_brightest_into,
@@ -25,10 +27,11 @@ use crate::detect::{
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::diagnosis::Unexplained;
-use crate::identify::{Choices, Priors, ScalePrior, SearchFailure};
+use crate::identify::{Choices, IndexedCatalog, Priors, ScalePrior, SearchFailure};
 use crate::photometry::PictureColors;
 use std::num::NonZeroUsize;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Solves the frame in a file, or its image number `page`, counted from 1.
 ///
@@ -217,7 +220,7 @@ fn solve(
             ..config.clone()
         };
         let more = stage.run(&all, &mut clock)?;
-        if let Some(more) = more.filter(|more| more.outcome.identification().is_some()) {
+        if let Some(more) = more.filter(FoundStars::are_identified) {
             stars = more;
             more_stars = Some(config.max_detections);
         }
@@ -225,6 +228,10 @@ fn solve(
     let FoundStars {
         detections,
         mosaic,
+        stars,
+        deep,
+    } = stars;
+    let IdentifiedStars {
         mut outcome,
         dropped_scale,
         places,
@@ -232,6 +239,9 @@ fn solve(
         place_time,
     } = stars;
     outcome = stage.explained(outcome, &detections, calibration);
+    let trails = stage.trails(&detections, &mut clock);
+    let over_deep = deep.as_ref().map(|deep| context.over(deep));
+    let context = over_deep.as_ref().unwrap_or(context);
     let sources: Vec<Source> = detections.sources.iter().map(Source::from).collect();
     let bodies = find_bodies(&mut outcome, &sources, &priors, context.indexed.catalog());
     let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
@@ -248,7 +258,7 @@ fn solve(
         priors,
         place_time,
         places,
-        trails: stage.trails(&detections, &mut clock),
+        trails,
         detections,
         sources,
         outcome,
@@ -270,7 +280,11 @@ fn solve(
         }
     }
     clock.lap(Stage::Photometry);
-    Ok(solved.into_solution(comparison, clock.timing()))
+    let solution = solved.into_solution(comparison, clock.timing());
+    Ok(Solution {
+        deep: deep.map(SolvedSky),
+        ..solution
+    })
 }
 
 /// Reads the colors of a frame: those behind its mosaic, or of the file of which it was read, calibrated as it was.
@@ -307,6 +321,13 @@ struct StarSearch<'a, 'c> {
 struct FoundStars {
     detections: Detections,
     mosaic: Option<RawColor>,
+    stars: IdentifiedStars,
+    /// The stars that they are, where it took a deep catalogue.
+    deep: Option<Arc<IndexedCatalog<'static>>>,
+}
+
+/// Which stars they are.
+struct IdentifiedStars {
     outcome: Outcome,
     /// The scale that was dropped because nothing matched with it.
     dropped_scale: Option<ScalePrior>,
@@ -378,9 +399,15 @@ impl StarSearch<'_, '_> {
         let Some((detections, mosaic)) = self.detect(config, clock)? else {
             return Ok(None);
         };
-        let mut stars = self.identify(detections, mosaic, None, clock);
+        let (stars, deep) = self.identify_in_all(&detections, clock);
+        let mut found = FoundStars {
+            detections,
+            mosaic,
+            stars,
+            deep,
+        };
         let held = self.context.fixed_camera.as_ref();
-        if stars.outcome.identification().is_none()
+        if !found.are_identified()
             && let Some(spot_sigma_px) = held.and_then(|held| held.spot_sigma_px)
         {
             // Behind clouds, what was measured as the size of stars may be that of clouds.
@@ -389,10 +416,32 @@ impl StarSearch<'_, '_> {
                 ..config.clone()
             };
             if let Some(again) = self.detect(&config, clock)? {
-                (stars.detections, stars.mosaic) = again;
+                (found.detections, found.mosaic) = again;
             }
         }
-        Ok(Some(stars))
+        Ok(Some(found))
+    }
+
+    /// Identifies stars with the catalogue of all frames or with deep ones. Also returns the stars of the deep one
+    /// that they are.
+    fn identify_in_all(
+        &mut self,
+        detections: &Detections,
+        clock: &mut Stopwatch,
+    ) -> (IdentifiedStars, Option<Arc<IndexedCatalog<'static>>>) {
+        let (context, priors, prepared) = (self.context, self.priors, self.prepared);
+        let frame = prepared.frame();
+        let size = Size::new(frame.width, frame.height);
+        let interrupt = self.workspace.of_frame.clone();
+        identify_in_all((context, priors), size, &interrupt, |context, priors| {
+            let mut search = StarSearch {
+                prepared,
+                priors,
+                context,
+                workspace: &mut *self.workspace,
+            };
+            search.identify(detections, None, clock)
+        })
     }
 
     /// The stars that are wanted: of the pointing alone, the brightest, if these show it; `None` if detection was
@@ -428,9 +477,14 @@ impl StarSearch<'_, '_> {
             let detector = &mut self.workspace.detect;
             measure_brightest_into(frame, config, count, detector, &mut detections)?;
             clock.lap(Stage::Detect);
-            let stars = self.identify(detections, None, Some(tried), clock);
+            let stars = self.identify(&detections, Some(tried), clock);
             if stars.outcome.identification().is_some() {
-                return Ok(Some(stars));
+                return Ok(Some(FoundStars {
+                    detections,
+                    mosaic: None,
+                    stars,
+                    deep: None,
+                }));
             }
         }
         Ok(None)
@@ -439,11 +493,10 @@ impl StarSearch<'_, '_> {
     /// Identifies stars, as far as what is known of the frame holds; only what is tried `at_once`, if that is stated.
     fn identify(
         &mut self,
-        detections: Detections,
-        mosaic: Option<RawColor>,
+        detections: &Detections,
         at_once: Option<Choices>,
         clock: &mut Stopwatch,
-    ) -> FoundStars {
+    ) -> IdentifiedStars {
         let frame = self.prepared.frame();
         let (priors, context) = (self.priors, self.context);
         let mut dropped_scale = None;
@@ -456,10 +509,10 @@ impl StarSearch<'_, '_> {
                 let workspace = &mut *self.workspace;
                 let (found, dropped) = match at_once {
                     Some(tried) => {
-                        let stars = (&detections, tried);
+                        let stars = (detections, tried);
                         search_at_once(frame, stars, known, context, workspace, clock)
                     }
-                    None => identify_stars(frame, &detections, known, context, workspace, clock),
+                    None => identify_stars(frame, detections, known, context, workspace, clock),
                 };
                 dropped_scale = dropped;
                 let is_identified = found.identification().is_some();
@@ -484,15 +537,23 @@ impl StarSearch<'_, '_> {
         } = settle(answer, known, sky, |places| {
             through_air_or_not(places, &mut identify)
         });
-        FoundStars {
-            detections,
-            mosaic,
+        IdentifiedStars {
             outcome,
             dropped_scale,
             places,
             priors,
             place_time,
         }
+    }
+}
+
+impl Answered for IdentifiedStars {
+    fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
+    fn outcome_mut(&mut self) -> &mut Outcome {
+        &mut self.outcome
     }
 }
 
@@ -503,7 +564,11 @@ impl FoundStars {
         let interrupted = Reason::Search(SearchFailure::Interrupted);
         self.detections.is_truncated
             && config.max_detections < DetectConfig::DEFAULT_MAX_DETECTIONS
-            && matches!(&self.outcome, Outcome::NotIdentified(reason) if *reason != interrupted)
+            && matches!(&self.stars.outcome, Outcome::NotIdentified(reason) if *reason != interrupted)
+    }
+
+    fn are_identified(&self) -> bool {
+        self.stars.outcome.identification().is_some()
     }
 }
 
@@ -537,6 +602,7 @@ fn not_in_time(
         trails: None,
         photometry: None,
         sky: None,
+        deep: None,
         comparison: None,
         gain_e_per_adu: camera.map(|camera| camera.sheet.gain_e_per_adu),
         calibration: calibration.map(Calibration::applied),

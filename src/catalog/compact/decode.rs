@@ -37,6 +37,27 @@ pub(in crate::catalog) fn decode(bytes: &[u8]) -> Result<Contents, CompactError>
     })
 }
 
+/// What the beginning of a compact catalogue says.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::catalog) struct CompactSummary {
+    pub(in crate::catalog) title: String,
+    pub(in crate::catalog) epoch_year: f64,
+    pub(in crate::catalog) stars: u64,
+}
+
+impl CompactSummary {
+    /// What `head` says; `None` where it is not the beginning of one, with the whole title.
+    pub(in crate::catalog) fn of_head(head: &[u8]) -> Option<Self> {
+        let header = CompactHeader::read(head).ok()?;
+        let title = head.get(HEADER_BYTES..HEADER_BYTES + header.title_bytes)?;
+        Some(Self {
+            title: String::from_utf8(title.to_owned()).ok()?,
+            epoch_year: header.epoch_year,
+            stars: header.stars as u64,
+        })
+    }
+}
+
 struct CompactHeader {
     ids: IdEncoding,
     stars: usize,

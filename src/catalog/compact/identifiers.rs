@@ -78,7 +78,7 @@ impl IdEncoding {
                 None => invalid(
                     kinds_at + i,
                     format!("an identifier of kind {kind} and value {value}"),
-                    "a kind from 0 to 5, and a value in its range",
+                    "a kind from 0 to 6, and a value in its range",
                 ),
             };
         kinds.iter().zip(values).enumerate().map(id).collect()

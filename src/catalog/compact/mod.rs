@@ -25,8 +25,9 @@
 //!
 //! Version 1 holds Skymap numbers only. In version 2 the identifiers are: bytes per value, `u32`, 4
 //! or 8; n bytes, the kind of each identifier (0 Skymap, 1 Tycho, 2 Hipparcos, 3 another number, 4
-//! name only); n values. A Tycho value is the region, star and component in 14, 14 and 4 bits; a
-//! Hipparcos value is the number and, in the low 8 bits, the letter of the component.
+//! name only, 5 Gaia, 6 a place); n values. A Tycho value is the region, star and component in 14, 14 and 4 bits; a
+//! Hipparcos value is the number and, in the low 8 bits, the letter of the component; a place is the right
+//! ascension in steps of 0.01 s, above 32 bits with the declination from the south pole in steps of 0.1″.
 //!
 //! Columns rather than records, because they compress better and are checked column by column.
 //! Stars are ordered by (V, identifier).
@@ -40,7 +41,7 @@ mod identifiers;
 mod layout;
 mod reader;
 
-pub(super) use decode::decode;
+pub(super) use decode::{CompactSummary, decode};
 pub(super) use encode::encode;
 pub(super) use layout::{MAGIC, checksum_of};
 pub(super) use reader::{ByteReader, invalid};

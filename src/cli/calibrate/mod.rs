@@ -134,6 +134,7 @@ impl CalibrateArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
+            deep: None,
         })
     }
 }

@@ -104,6 +104,7 @@ impl NightArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
+            deep: None,
         })
     }
 }

@@ -6,8 +6,10 @@ use crate::cli::output::messages::{one_line, report_warning};
 use crate::cli::progress::bar;
 use clap::Args;
 use indicatif::ProgressBar;
+use starpipe::catalog::deep::{DeepCatalog, installed_paths};
 use starpipe::catalog::{self, Catalog};
 use starpipe::identify::{IndexedCatalog, cache_directory};
+use starpipe::solve::{DeepProgress, DeepSky};
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -57,8 +59,37 @@ impl CatalogOptions {
         self.read_reporting(true)
     }
 
+    /// The deep catalogues for narrow fields: those that are stated, else those that are installed.
+    pub(crate) fn deep(&self, tells: bool) -> anyhow::Result<Option<DeepSky>> {
+        let cache = self.cache_dir.clone().or_else(cache_directory);
+        let deep = match &self.catalog {
+            Some(path) => match DeepCatalog::find(path)? {
+                found if found.is_empty() => return Ok(None),
+                found => DeepSky::new(found, cache),
+            },
+            None => match installed_paths() {
+                paths if paths.is_empty() => return Ok(None),
+                paths => DeepSky::installed(paths, cache),
+            },
+        };
+        let progress = match tells {
+            true => bar(100, "indexing the deep catalog {wide_bar} {percent} %"),
+            false => ProgressBar::hidden(),
+        };
+        Ok(Some(deep.with_progress(Box::new(move |done| match done {
+            DeepProgress::Share(share) => progress.set_position((share * 100.0) as u64),
+            DeepProgress::Done => progress.finish_and_clear(),
+            _ => {}
+        }))))
+    }
+
     fn read_reporting(&self, tells: bool) -> anyhow::Result<Cow<'static, Catalog>> {
-        let Some(path) = &self.catalog else {
+        let stated = self.catalog.as_ref();
+        let is_deep = match stated {
+            Some(path) => !DeepCatalog::find(path)?.is_empty(),
+            None => false,
+        };
+        let Some(path) = stated.filter(|_| !is_deep) else {
             return Ok(Cow::Borrowed(Catalog::built_in()));
         };
         let reading = catalog::read(path)?;

@@ -141,6 +141,7 @@ impl ProcessArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
+            deep: self.solving.deep()?,
         })
     }
 }

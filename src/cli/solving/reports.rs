@@ -6,7 +6,7 @@ use super::printer::Printer;
 use super::result_files::ResultFiles;
 use super::solver::{InputSolver, Sink};
 use crate::cli::exit::{CommandError, Exit, OutcomeTally};
-use crate::cli::output::messages::report_error;
+use crate::cli::output::messages::{one_line, report_error, report_warning};
 use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
@@ -16,7 +16,7 @@ use starpipe::catalog::Catalog;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
 use starpipe::report::FrameReport;
-use starpipe::solve::{Context, SolveOptions};
+use starpipe::solve::{Context, DeepSky, SolveOptions};
 use starpipe::store::FrameRow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -28,12 +28,15 @@ pub(crate) struct SolvingPlan {
     pub(crate) camera: Option<CameraDescription>,
     pub(crate) calibration: Option<Calibration>,
     pub(crate) memory: MemoryLimit,
+    /// For fields that the catalog is too sparse for.
+    pub(crate) deep: Option<DeepSky>,
 }
 
 impl SolvingPlan {
     pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         let mut context = Context::new(indexed).with_options(&self.options, self.camera.clone());
         context.calibration = self.calibration.as_ref();
+        context.deep = self.deep.as_ref();
         context
     }
 }
@@ -83,6 +86,11 @@ pub(crate) fn report_all(
         })?;
     }
     run.progress.finish_and_clear();
+    if let Some(deep) = plan.deep.as_ref().filter(|_| !output.quiet) {
+        for error in deep.take_errors() {
+            report_warning(format_args!("{}; it was not used", one_line(&error)));
+        }
+    }
     let _ = run.printer.finish(&run.tally)?;
     Ok(run.tally.exit())
 }
@@ -106,8 +114,9 @@ impl Sink for Reports<'_> {
     type Made = Report;
 
     fn make(&self, image: &ImageName, solved: &SolvedImage) -> Report {
-        let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
-        let failures = self.files.save(image, solved, &report, self.catalog);
+        let catalog = solved.solution.catalog(self.catalog);
+        let report = FrameReport::new(&image.to_string(), &solved.solution, catalog);
+        let failures = self.files.save(image, solved, &report, catalog);
         let row = self
             .needs_rows
             .then(|| FrameRow::new(&report, &solved.solution));

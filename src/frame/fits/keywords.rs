@@ -16,10 +16,10 @@
 //!   picture, and shifted by XBAYROFF columns and YBAYROFF rows.
 //! - Pixels without light: BIASSEC ([`overscan`](super::overscan)).
 //! - Zenith distance: CENTALT or OBJCTALT, the altitude in degrees.
+//! - Pointing of the mount: RA and DEC, OBJCTRA and OBJCTDEC, TELRA and TELDEC, or CRVAL1 and CRVAL2 of axes RA and
+//!   DEC. Numbers are degrees, sexagesimal right ascensions hours.
 //!
 //! In keywords with a dash an underscore may stand for it: DATE_OBS.
-//!
-//! The pointing of the mount (OBJCTRA, RA, CRVAL1) is not used.
 
 use super::header::{UnitHeader, parse_number};
 use crate::base::angle::Angle;
@@ -45,6 +45,7 @@ pub(super) fn metadata(keywords: &Keywords) -> FrameMetadata {
     let altitude_deg = keywords.number(&mut metadata, &ALTITUDE, &["CENTALT", "OBJCTALT"]);
     metadata.zenith_distance_deg = altitude_deg.map(|altitude| 90.0 - altitude);
     metadata.bayer_pattern = keywords.bayer_pattern();
+    metadata.pointing_deg = keywords.pointing_deg();
     metadata
 }
 
@@ -137,6 +138,33 @@ impl<'a> Keywords<'a> {
         keywords.iter().find_map(|keyword| {
             let text = self.text(keyword)?;
             metadata.plausible(number, keyword, &text, parse_number(&text))
+        })
+    }
+
+    /// Where the mount points. Programs write other things into these keywords, or zeros.
+    fn pointing_deg(&self) -> Option<[f64; 2]> {
+        let is_world = self
+            .text("CTYPE1")
+            .is_some_and(|axis| axis.starts_with("RA"));
+        let pairs = [
+            ("RA", "DEC"),
+            ("OBJCTRA", "OBJCTDEC"),
+            ("TELRA", "TELDEC"),
+            ("CRVAL1", "CRVAL2"),
+        ];
+        let pairs = pairs
+            .into_iter()
+            .filter(|(ra, _)| *ra != "CRVAL1" || is_world);
+        let mut places = pairs.filter_map(|(ra, dec)| {
+            let ra_deg = match Angle::parse(&self.text(ra)?)? {
+                Angle::Sexagesimal(hours) | Angle::Hours(hours) => 15.0 * hours,
+                Angle::Decimal(degrees) | Angle::Degrees(degrees) => degrees,
+            };
+            Some([ra_deg, Angle::parse(&self.text(dec)?)?.in_degrees()?])
+        });
+        places.find(|[ra_deg, dec_deg]| {
+            let is_place = (0.0..=360.0).contains(ra_deg) && dec_deg.abs() <= 90.0;
+            is_place && [*ra_deg, *dec_deg] != [0.0; 2]
         })
     }
 

@@ -2,6 +2,7 @@
 
 use super::cache::{self, CacheError};
 use super::cache_directory::cache_directory;
+use super::listing::{FIELD_TO_SMALLEST, class_limits_rad, classes_of_fields_rad};
 use super::packed_vectors::PackedVectors;
 use super::table::{CHUNKS, Triangle, TriangleRange};
 use super::triangle_index::TriangleIndex;
@@ -10,10 +11,9 @@ use crate::base::units::RAD_PER_DEG;
 use crate::catalog::sky_grid::SkyGrid;
 use crate::catalog::{Catalog, Star};
 use std::path::Path;
+use std::sync::Arc;
+use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
-/// of the triangles.
-const FIELD_TO_SMALLEST: f64 = 3.75;
 /// Wider lenses are no pinholes any more.
 const WIDEST_FOV_DEG: f64 = 80.0;
 /// Area of the whole sky.
@@ -43,7 +43,7 @@ const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub struct IndexedCatalog<'a> {
-    catalog: &'a Catalog,
+    catalog: Held<'a>,
     /// The stars by position.
     pub grid: SkyGrid,
     /// The triangles.
@@ -51,6 +51,83 @@ pub struct IndexedCatalog<'a> {
     /// The directions of the stars, for triangles.
     pub(in crate::identify) vectors: PackedVectors,
     counts: MagnitudeCounts,
+    /// Area of the sky that the catalog covers.
+    area_sq_deg: f64,
+}
+
+/// The catalog that is indexed.
+enum Held<'a> {
+    Borrowed(&'a Catalog),
+    Shared(Arc<Catalog>),
+}
+
+impl Held<'_> {
+    fn get(&self) -> &Catalog {
+        match self {
+            Self::Borrowed(catalog) => catalog,
+            Self::Shared(catalog) => catalog,
+        }
+    }
+}
+
+/// What of a catalog is indexed, and for which fields.
+struct Scope {
+    /// Names the index among others.
+    key: u64,
+    /// Smallest and largest longest side of each class of triangles.
+    limits_rad: Vec<[f64; 2]>,
+    /// Area of the sky that the catalog covers.
+    area_sq_deg: f64,
+}
+
+impl Scope {
+    /// A catalog of the whole sky, for all fields.
+    fn whole(catalog: &Catalog) -> Self {
+        Self {
+            key: catalog.checksum(),
+            limits_rad: class_limits_rad(catalog.stars().len()),
+            area_sq_deg: WHOLE_SKY_SQ_DEG,
+        }
+    }
+}
+
+/// A part of the sky, and the fields that are searched there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SearchedPart {
+    /// Its area.
+    pub area_sq_deg: f64,
+    /// The narrowest and the widest field, in radians.
+    pub fov_range_rad: [f64; 2],
+}
+
+impl IndexedCatalog<'static> {
+    /// Indexes a catalog of a part of the sky. With a directory the index is kept there.
+    ///
+    /// # Errors
+    /// [`Interrupted`] when `interrupt` is due.
+    pub(crate) fn of_part(
+        catalog: Arc<Catalog>,
+        part: SearchedPart,
+        cache_directory: Option<&Path>,
+        progress: &(dyn Fn(f64) + Sync),
+        interrupt: &Interrupt,
+    ) -> Result<Self, Interrupted> {
+        let [narrowest_rad, widest_rad] = part.fov_range_rad;
+        let fields = [narrowest_rad.to_bits(), widest_rad.to_bits()];
+        let bytes = fields.map(u64::to_le_bytes).concat();
+        let scope = Scope {
+            key: xxh3_64_with_seed(&bytes, catalog.checksum()),
+            limits_rad: classes_of_fields_rad(part.fov_range_rad),
+            area_sq_deg: part.area_sq_deg,
+        };
+        Self::open_scope(
+            Held::Shared(catalog),
+            scope,
+            cache_directory,
+            progress,
+            interrupt,
+        )
+    }
 }
 
 #[cfg(any(feature = "built-in-catalog", test))]
@@ -91,29 +168,44 @@ impl<'a> IndexedCatalog<'a> {
         progress: &(dyn Fn(f64) + Sync),
         interrupt: &Interrupt,
     ) -> Result<Self, Interrupted> {
-        let build = || {
-            let triangles = TriangleIndex::build(catalog.stars(), progress, interrupt)?;
-            Ok(Self::with_index(catalog, triangles))
+        let scope = Scope::whole(catalog);
+        Self::open_scope(
+            Held::Borrowed(catalog),
+            scope,
+            cache_directory,
+            progress,
+            interrupt,
+        )
+    }
+
+    fn open_scope(
+        catalog: Held<'a>,
+        scope: Scope,
+        cache_directory: Option<&Path>,
+        progress: &(dyn Fn(f64) + Sync),
+        interrupt: &Interrupt,
+    ) -> Result<Self, Interrupted> {
+        let build = |scope: &Scope| {
+            let stars = catalog.get().stars();
+            TriangleIndex::build(stars, scope.limits_rad.clone(), progress, interrupt)
         };
         let Some(directory) = cache_directory else {
-            return build();
+            let triangles = build(&scope)?;
+            return Ok(Self::with_index(catalog, triangles, scope.area_sq_deg));
         };
-        let checksum = catalog.checksum();
-        let path = cache::index_path(directory, checksum);
+        let path = cache::index_path(directory, scope.key);
         let mut errors = Vec::new();
-        let indexed = match cache::load(&path, checksum) {
-            Ok(Some((classes, file))) => {
-                Self::with_index(catalog, TriangleIndex::new(classes, Some(file)))
-            }
+        let triangles = match cache::load(&path, scope.key) {
+            Ok(Some((classes, file))) => TriangleIndex::new(classes, Some(file), scope.limits_rad),
             not_loaded => {
                 errors.extend(not_loaded.err());
-                let built = build()?;
-                errors.extend(cache::store(&path, checksum, &built.triangles.classes).err());
+                let built = build(&scope)?;
+                errors.extend(cache::store(&path, scope.key, &built.classes).err());
                 built
             }
         };
-        indexed.triangles.cache_errors().extend(errors);
-        Ok(indexed)
+        triangles.cache_errors().extend(errors);
+        Ok(Self::with_index(catalog, triangles, scope.area_sq_deg))
     }
 
     /// Reads the index of `catalog` from bytes that [`index_bytes`](Self::index_bytes) returned.
@@ -121,10 +213,17 @@ impl<'a> IndexedCatalog<'a> {
     /// # Errors
     /// [`CacheError::Damaged`] if the bytes are not the index of this catalog.
     pub fn with_index_bytes(catalog: &'a Catalog, bytes: Vec<u8>) -> Result<Self, CacheError> {
-        let (classes, file) = cache::from_bytes(bytes, catalog.checksum())?;
+        let Scope {
+            key,
+            limits_rad,
+            area_sq_deg,
+        } = Scope::whole(catalog);
+        let (classes, file) = cache::from_bytes(bytes, key)?;
+        let triangles = TriangleIndex::new(classes, Some(file), limits_rad);
         Ok(Self::with_index(
-            catalog,
-            TriangleIndex::new(classes, Some(file)),
+            Held::Borrowed(catalog),
+            triangles,
+            area_sq_deg,
         ))
     }
 
@@ -135,7 +234,7 @@ impl<'a> IndexedCatalog<'a> {
                 self.triangles.chunk(self.stars(), class, chunk);
             }
         }
-        cache::to_bytes(self.catalog.checksum(), &self.triangles.classes)
+        cache::to_bytes(self.catalog().checksum(), &self.triangles.classes)
     }
 
     /// The name of the index of `catalog`: it changes with the catalog and with the format.
@@ -148,13 +247,16 @@ impl<'a> IndexedCatalog<'a> {
         Self::open(catalog, None, progress)
     }
 
-    fn with_index(catalog: &'a Catalog, triangles: TriangleIndex) -> Self {
+    fn with_index(catalog: Held<'a>, mut triangles: TriangleIndex, area_sq_deg: f64) -> Self {
+        let stars = catalog.get().stars();
+        triangles.set_magnitudes_of(stars);
         Self {
-            catalog,
-            grid: SkyGrid::new(catalog.stars()),
+            grid: SkyGrid::new(stars),
             triangles,
-            vectors: PackedVectors::new(catalog.stars()),
-            counts: MagnitudeCounts::new(catalog.stars()),
+            vectors: PackedVectors::new(stars),
+            counts: MagnitudeCounts::new(stars),
+            area_sq_deg,
+            catalog,
         }
     }
 
@@ -186,13 +288,13 @@ impl<'a> IndexedCatalog<'a> {
     }
 
     /// The stars of the catalog, brightest first.
-    pub fn stars(&self) -> &'a [Star] {
-        self.catalog.stars()
+    pub fn stars(&self) -> &[Star] {
+        self.catalog().stars()
     }
 
     /// The catalog.
-    pub fn catalog(&self) -> &'a Catalog {
-        self.catalog
+    pub fn catalog(&self) -> &Catalog {
+        self.catalog.get()
     }
 
     /// V magnitude of the faintest star; 0 if there is none.
@@ -205,13 +307,14 @@ impl<'a> IndexedCatalog<'a> {
     pub fn chance_within(&self, radius_rad: f64, bright_v_mag: f64, faint_v_mag: f64) -> f64 {
         let stars =
             self.counts.brighter_than(faint_v_mag) - self.counts.brighter_than(bright_v_mag);
-        // The disc's share of the sphere.
-        (stars * radius_rad * radius_rad / 4.0).max(1e-9)
+        // The disc's share of the sphere, as if that had everywhere as many stars.
+        let whole = WHOLE_SKY_SQ_DEG / self.area_sq_deg;
+        (stars * whole * radius_rad * radius_rad / 4.0).max(1e-9)
     }
 
     /// The limiting V magnitude at which the mean density of stars is `per_sq_deg`.
     pub fn magnitude_of_density(&self, per_sq_deg: f64) -> f64 {
-        let rank = (per_sq_deg * WHOLE_SKY_SQ_DEG) as usize;
+        let rank = (per_sq_deg * self.area_sq_deg) as usize;
         match self.stars().get(rank) {
             Some(star) => f64::from(star.v_mag),
             None => self.faintest_v_mag(),
@@ -225,7 +328,7 @@ struct MagnitudeCounts(Vec<f64>);
 impl MagnitudeCounts {
     const BRIGHTEST_V_MAG: f64 = -2.0;
     const STEPS_PER_MAG: f64 = 4.0;
-    const STEPS: usize = 80;
+    const STEPS: usize = 100;
 
     fn new(stars: &[Star]) -> Self {
         let count = |step: usize| {

@@ -9,12 +9,12 @@
 //! The inner loops use plain numbers: they run some ten million times, also in programs that are
 //! built without optimization.
 
-use super::cells::{SkyCells, Zone};
-use super::table::{MAX_STARS, SizeClass, Triangle};
+use super::table::{FAINTEST_V_MAG, MAX_STARS, SizeClass, Triangle};
 use super::triangle::TriangleShape;
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::Star;
+use crate::catalog::sky_cells::{SkyCells, Zone};
 use crate::catalog::sky_grid::chord_of;
 use arrayvec::ArrayVec;
 use libm::log;
@@ -24,6 +24,9 @@ use rayon::prelude::*;
 /// 60° wide hold.
 const MIN_DEG: f64 = 0.4;
 const MAX_DEG: f64 = 45.0;
+/// Width of the narrowest field over the smallest longest side listed: narrower fields hold too few
+/// of the triangles.
+pub const FIELD_TO_SMALLEST: f64 = 3.75;
 /// Smaller classes are added as long as a cell has on average this many stars around it, down to
 /// 0.2°: what fields from 0.75° hold.
 const STARS_AROUND_NARROW_CELL: f64 = 8.0;
@@ -41,8 +44,14 @@ const STARS_PER_CELL: [(f64, usize); 4] =
     [(0.9, 6), (3.0, 7), (8.0, 9), (90.0, MAX_STARS_PER_CELL)];
 const MAX_STARS_PER_CELL: usize = 12;
 
-/// The brightest stars around a cell, brightest first.
-type Around = ArrayVec<u32, MAX_STARS_PER_CELL>;
+/// A cell with stars around it.
+struct Around {
+    cell: usize,
+    /// Unit vector to its centre.
+    centre: [f64; 3],
+    /// The brightest stars around it, brightest first.
+    stars: ArrayVec<u32, MAX_STARS_PER_CELL>,
+}
 
 /// A star of the catalog in the form that listing needs.
 #[derive(Debug, Clone, Copy)]
@@ -83,6 +92,19 @@ pub fn class_limits_rad(stars: usize) -> Vec<[f64; 2]> {
     (narrowest..count).map(limits).collect()
 }
 
+/// Smallest and largest longest side of each class, in radians, of the triangles that fields of these widths
+/// hold, the narrowest and the widest.
+pub fn classes_of_fields_rad([narrowest_rad, widest_rad]: [f64; 2]) -> Vec<[f64; 2]> {
+    /// The diagonal of a field over its width is less.
+    const DIAGONAL: f64 = 1.5;
+    let smallest_rad = narrowest_rad / FIELD_TO_SMALLEST;
+    let largest_rad = (widest_rad * DIAGONAL).min(MAX_DEG * RAD_PER_DEG);
+    let lows = std::iter::successors(Some(smallest_rad), |low_rad| Some(low_rad * CLASS_FACTOR));
+    let lows = lows.take_while(|low_rad| *low_rad < largest_rad);
+    lows.map(|low_rad| [low_rad, low_rad * CLASS_FACTOR])
+        .collect()
+}
+
 /// Lists the class whose longest sides are within `limits_rad`. `stars` are all stars of
 /// the catalog, brightest first.
 ///
@@ -104,6 +126,12 @@ pub fn list_class(
         .collect::<Result<Vec<_>, Interrupted>>()?;
     let limits = [class.low, class.high];
     Ok(SizeClass::new(limits, &triangles.concat()))
+}
+
+/// How much fainter the magnitudes of triangles are than those that are stored, so that those of the faintest
+/// stars fit.
+pub fn fainter_mag(faintest_v_mag: Option<f32>) -> f32 {
+    faintest_v_mag.map_or(0.0, |v_mag| (v_mag - FAINTEST_V_MAG).max(0.0))
 }
 
 fn stars_per_cell(low_rad: f64) -> usize {
@@ -134,6 +162,8 @@ struct Class<'a> {
     high: f64,
     /// Logarithm of their ratio.
     ln_range: f64,
+    /// See [`SizeClass::fainter_mag`].
+    fainter_mag: f32,
 }
 
 impl<'a> Class<'a> {
@@ -146,6 +176,7 @@ impl<'a> Class<'a> {
             low: chord_of(low_rad),
             high: chord_of(high_rad),
             ln_range: log(chord_of(high_rad) / chord_of(low_rad)),
+            fainter_mag: fainter_mag(stars.last().map(|star| star.v_mag)),
         };
         (class, SkyCells::new(low_rad * CELL_HEIGHT, radius_rad))
     }
@@ -154,9 +185,9 @@ impl<'a> Class<'a> {
     /// cones around them, brightest first.
     fn triangles_of(&self, zone: &Zone, near: &[u32]) -> Vec<Triangle> {
         let mut triangles = Vec::new();
-        for (cell, around) in self.brightest_around(zone, near).iter().enumerate() {
+        for around in self.brightest_around(zone, near) {
             let first = triangles.len();
-            self.list_cell(zone, cell, around, &mut triangles);
+            self.list_cell(zone, &around, &mut triangles);
             // By the faintest star, then the next: independent of how they were found.
             triangles[first..].sort_unstable_by_key(|triangle| {
                 let mut corners = triangle.corners();
@@ -167,33 +198,44 @@ impl<'a> Class<'a> {
         triangles
     }
 
-    /// The brightest stars in the cone around each cell of a zone, brightest first.
+    /// The cells of a zone that have stars in the cone around them, with the brightest of these.
     fn brightest_around(&self, zone: &Zone, near: &[u32]) -> Vec<Around> {
-        let centres = zone.centres();
-        let mut brightest = vec![Around::new(); zone.cells];
+        // For each cell its place among those with stars, from 1.
+        let mut places = vec![0u32; if near.is_empty() { 0 } else { zone.cells }];
+        let mut found: Vec<Around> = Vec::new();
         let mut not_full = zone.cells;
         for &number in near {
             let star = &self.stars[number as usize];
             let direction = in_single_precision(&star.direction);
             for cell in zone.cells_near(&star.direction, star.ra_rad) {
                 let cell = cell % zone.cells;
-                let around = &mut brightest[cell];
-                if around.len() < self.stars_per_cell
-                    && distance_sq(&direction, &centres[cell]) <= self.chord_sq
+                if places[cell] == 0 {
+                    found.push(Around {
+                        cell,
+                        centre: zone.centre(cell),
+                        stars: ArrayVec::new(),
+                    });
+                    places[cell] = found.len() as u32;
+                }
+                let around = &mut found[places[cell] as usize - 1];
+                if around.stars.len() < self.stars_per_cell
+                    && distance_sq(&direction, &around.centre) <= self.chord_sq
                 {
-                    around.push(number);
-                    not_full -= usize::from(around.len() == self.stars_per_cell);
+                    around.stars.push(number);
+                    not_full -= usize::from(around.stars.len() == self.stars_per_cell);
                 }
             }
             if not_full == 0 {
                 break;
             }
         }
-        brightest
+        found.sort_unstable_by_key(|around| around.cell);
+        found
     }
 
     /// Lists the triangles of the stars `around` a cell that belong to that cell.
-    fn list_cell(&self, zone: &Zone, cell: usize, around: &[u32], out: &mut Vec<Triangle>) {
+    fn list_cell(&self, zone: &Zone, around: &Around, out: &mut Vec<Triangle>) {
+        let (cell, around) = (around.cell, &around.stars[..]);
         // Nearly: the root decides.
         let least_sq = self.low * self.low * (1.0 - 1e-9);
         let most_sq = self.high * self.high * (1.0 + 1e-9);
@@ -241,7 +283,8 @@ impl<'a> Class<'a> {
                 let points = [side[0], side[1], third];
                 let corners = shape.order.map(|corner| points[corner]);
                 let share = log(shape.longest / self.low) / self.ln_range;
-                let v_mags = corners.map(|corner| self.stars[corner as usize].v_mag);
+                let v_mags =
+                    corners.map(|corner| self.stars[corner as usize].v_mag - self.fainter_mag);
                 out.push(Triangle::new(corners, shape.ratios, share, v_mags));
             }
         }
@@ -303,8 +346,10 @@ mod tests {
             for number in [0, 1, cells.zones / 3, cells.zones / 2, cells.zones - 1] {
                 let zone = cells.zone(number);
                 let found = class.brightest_around(&zone, &by_zone[number]);
-                for (found, centre) in found.iter().zip(zone.centres()) {
-                    assert_eq!(found[..], brightest_around(&class, &centre));
+                assert_eq!(found.len(), zone.cells);
+                for around in found {
+                    assert_eq!(around.centre, zone.centre(around.cell));
+                    assert_eq!(around.stars[..], brightest_around(&class, &around.centre));
                 }
             }
         }

@@ -31,6 +31,8 @@ pub const TRIANGLE_BYTES: usize = 16;
 /// Brightest magnitude that is stored, and the step of magnitudes.
 const BRIGHTEST_V_MAG: f32 = -2.0;
 const MAG_STEP: f32 = 1.0 / 16.0;
+/// Faintest magnitude that is stored.
+pub const FAINTEST_V_MAG: f32 = BRIGHTEST_V_MAG + 255.0 * MAG_STEP;
 /// A size class is divided in this many sizes.
 const SIZES: f64 = 256.0;
 
@@ -128,6 +130,8 @@ pub struct SizeClass {
     pub low: f64,
     /// Largest longest side, as a chord.
     pub high: f64,
+    /// V magnitudes of the corners less those that are stored: those of deep catalogues would not fit.
+    pub fainter_mag: f32,
     /// Logarithm of `low`, and from one size to the next.
     ln_low: f64,
     ln_step: f64,
@@ -169,6 +173,7 @@ impl SizeClass {
         Self {
             low,
             high,
+            fainter_mag: 0.0,
             ln_low: libm::log(low),
             ln_step: libm::log(high / low) / SIZES,
             cell_starts,

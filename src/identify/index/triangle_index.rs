@@ -8,8 +8,8 @@
 //! the sky: Lang et al. 2010, AJ 139, 1782.
 
 use super::cache::{CacheError, IndexFile};
-use super::listing::{ListedStar, class_limits_rad, list_class};
-use super::table::{SizeClass, Triangle};
+use super::listing::{ListedStar, fainter_mag, list_class};
+use super::table::{MAX_STARS, SizeClass, Triangle};
 use crate::base::interrupt::{Interrupt, Interrupted};
 use crate::catalog::Star;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -19,6 +19,8 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 pub struct TriangleIndex {
     /// The size classes, in ascending order and without gaps.
     pub classes: Vec<SizeClass>,
+    /// Smallest and largest longest side of each, in radians.
+    limits_rad: Vec<[f64; 2]>,
     /// The file that holds the chunks that are not yet in memory.
     file: Option<IndexFile>,
     /// Classes listed again because a chunk of them could not be read.
@@ -27,32 +29,47 @@ pub struct TriangleIndex {
 }
 
 impl TriangleIndex {
-    /// Lists the triangles of `stars`, brightest first; calls `progress` with the share done.
+    /// Lists the triangles of `stars`, brightest first, in classes with these smallest and largest longest sides;
+    /// calls `progress` with the share done.
     ///
     /// # Errors
     /// [`Interrupted`] when `interrupt` is due.
     pub fn build(
         stars: &[Star],
+        limits_rad: Vec<[f64; 2]>,
         progress: &(dyn Fn(f64) + Sync),
         interrupt: &Interrupt,
     ) -> Result<Self, Interrupted> {
-        let limits = class_limits_rad(stars.len());
         let stars = ListedStar::all(stars);
-        let mut classes = Vec::with_capacity(limits.len());
-        for limits_rad in &limits {
-            classes.push(list_class(&stars, *limits_rad, interrupt)?);
-            progress(classes.len() as f64 / limits.len() as f64);
+        let mut classes = Vec::with_capacity(limits_rad.len());
+        for limits in &limits_rad {
+            classes.push(list_class(&stars, *limits, interrupt)?);
+            progress(classes.len() as f64 / limits_rad.len() as f64);
         }
-        Ok(Self::new(classes, None))
+        Ok(Self::new(classes, None, limits_rad))
     }
 
-    /// The index of `classes`; chunks that are not in memory are read from `file`.
-    pub fn new(classes: Vec<SizeClass>, file: Option<IndexFile>) -> Self {
+    /// The index of `classes`, with their limits; chunks that are not in memory are read from `file`.
+    pub fn new(
+        classes: Vec<SizeClass>,
+        file: Option<IndexFile>,
+        limits_rad: Vec<[f64; 2]>,
+    ) -> Self {
         Self {
             relisted: classes.iter().map(|_| OnceLock::new()).collect(),
             classes,
+            limits_rad,
             file,
             cache_errors: Mutex::default(),
+        }
+    }
+
+    /// The stars are these.
+    pub(super) fn set_magnitudes_of(&mut self, stars: &[Star]) {
+        let listed = &stars[..stars.len().min(MAX_STARS)];
+        let fainter_mag = fainter_mag(listed.last().map(|star| star.v_mag));
+        for class in &mut self.classes {
+            class.fainter_mag = fainter_mag;
         }
     }
 
@@ -87,9 +104,8 @@ impl TriangleIndex {
 
     fn list_again(&self, stars: &[Star], class: usize, chunk: usize) -> Box<[Triangle]> {
         let relisted = self.relisted[class].get_or_init(|| {
-            let limits_rad = class_limits_rad(stars.len());
             let stars = ListedStar::all(stars);
-            list_class(&stars, limits_rad[class], &Interrupt::default())
+            list_class(&stars, self.limits_rad[class], &Interrupt::default())
                 .expect("nothing interrupts it")
         });
         relisted.chunks[chunk].get().cloned().unwrap_or_default()
@@ -105,6 +121,7 @@ impl TriangleIndex {
 
 #[cfg(test)]
 mod tests {
+    use super::super::listing::class_limits_rad;
     use super::super::table::WantedShape;
     use super::super::triangle::TriangleShape;
     use super::*;
@@ -112,6 +129,11 @@ mod tests {
     use crate::catalog::Catalog;
     use crate::identify::index::cache;
     use std::collections::HashSet;
+
+    fn built(stars: &[Star]) -> TriangleIndex {
+        let limits_rad = class_limits_rad(stars.len());
+        TriangleIndex::build(stars, limits_rad, &|_| (), &Interrupt::default()).unwrap()
+    }
 
     /// All triangles of a class.
     fn listed(class: &SizeClass) -> impl Iterator<Item = &Triangle> {
@@ -124,7 +146,7 @@ mod tests {
     #[test]
     fn a_search_finds_what_going_through_all_triangles_finds() {
         let stars = &Catalog::built_in().stars()[..3000];
-        let index = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
+        let index = built(stars);
         let mut compared = 0;
         for (number, class) in index.classes.iter().enumerate() {
             for (wanted, tolerance) in [
@@ -171,7 +193,7 @@ mod tests {
     #[test]
     fn the_brightest_stars_of_a_field_make_listed_triangles() {
         let stars = &Catalog::built_in().stars()[..9000];
-        let index = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
+        let index = built(stars);
         let listed = index.classes.iter().flat_map(listed);
         let listed: HashSet<[u32; 3]> = listed.map(|triangle| sorted(triangle.corners())).collect();
         for (ra_rad, dec_rad) in [(0.3, 0.2), (2.0, -1.2), (4.0, 1.5), (5.5, -0.5)] {
@@ -192,7 +214,7 @@ mod tests {
     #[test]
     fn a_class_of_which_a_chunk_is_damaged_is_listed_again() {
         let stars = &Catalog::built_in().stars()[..100];
-        let built = TriangleIndex::build(stars, &|_| (), &Interrupt::default()).unwrap();
+        let built = built(stars);
         let directory = tempfile::tempdir().unwrap();
         let path = cache::index_path(directory.path(), 7);
         cache::store(&path, 7, &built.classes).unwrap();
@@ -200,7 +222,7 @@ mod tests {
         *bytes.last_mut().unwrap() ^= 1;
         std::fs::write(&path, bytes).unwrap();
         let (classes, file) = cache::load(&path, 7).unwrap().unwrap();
-        let read = TriangleIndex::new(classes, Some(file));
+        let read = TriangleIndex::new(classes, Some(file), class_limits_rad(stars.len()));
         for (number, class) in built.classes.iter().enumerate() {
             for (chunk, expected) in class.chunks.iter().enumerate() {
                 let expected = &expected.get().unwrap()[..];

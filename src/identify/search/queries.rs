@@ -298,7 +298,7 @@ impl ObservedStars<'_> {
         let class = &self.sky.triangles.classes[query.class];
         let has_shape = query.shape.test();
         let [a, b, c] = query.triangle.stars;
-        let mag = |star: usize| self.field.stars[star].mag as f32;
+        let mag = |star: usize| self.field.stars[star].mag as f32 - class.fainter_mag;
         let mags = [mag(a), mag(b), mag(c)];
         let mut candidates = 0;
         for triangle in triangles.iter().filter(|triangle| has_shape(triangle)) {

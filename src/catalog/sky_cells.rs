@@ -66,6 +66,16 @@ impl SkyCells {
         }
     }
 
+    /// The numbers of the zone and of the cell in it that hold a direction.
+    pub fn cell_of(&self, direction: &UnitVector<Icrs>) -> (usize, usize) {
+        let (ra_rad, dec_rad) = direction.to_ra_dec();
+        let zone = ((dec_rad + FRAC_PI_2) / self.zone_height_rad) as usize;
+        let zone = zone.min(self.zones - 1);
+        let cells = self.zone(zone).cells;
+        let cell = (ra_rad / TAU * cells as f64) as usize;
+        (zone, cell.min(cells - 1))
+    }
+
     /// The zones that may have cells whose cones hold `direction`, a unit vector.
     pub fn zones_near(&self, direction: &[f64; 3]) -> Range<usize> {
         let from_south_rad = asin(direction[2].clamp(-1.0, 1.0)) + FRAC_PI_2;
@@ -78,14 +88,10 @@ impl SkyCells {
 }
 
 impl Zone<'_> {
-    /// Unit vectors to the centres of the cells, by ascending right ascension.
-    pub fn centres(&self) -> Vec<[f64; 3]> {
-        let mut centres = Vec::with_capacity(self.cells);
-        for cell in 0..self.cells {
-            let (sin_ra, cos_ra) = sincos((cell as f64 + 0.5) / self.cells as f64 * TAU);
-            centres.push([self.cos_dec * cos_ra, self.cos_dec * sin_ra, self.sin_dec]);
-        }
-        centres
+    /// Unit vector to the centre of a cell; cells are numbered by ascending right ascension.
+    pub fn centre(&self, cell: usize) -> [f64; 3] {
+        let (sin_ra, cos_ra) = sincos((cell as f64 + 0.5) / self.cells as f64 * TAU);
+        [self.cos_dec * cos_ra, self.cos_dec * sin_ra, self.sin_dec]
     }
 
     /// The cells whose cones may hold `direction`, a unit vector with the right ascension `ra_rad`.

@@ -1,0 +1,138 @@
+//! Cells of HEALPix, a partition of the sky into cells of equal area.
+//!
+//! # Reference
+//! Górski et al. 2005, ApJ 622, 759, sect. 5.
+
+use crate::base::coords::{Icrs, UnitVector};
+use crate::base::units::RAD_PER_DEG;
+use nalgebra::Vector3;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// A cell: one of the twelve faces, and its place there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct HealpixCell {
+    face: u32,
+    x: u32,
+    y: u32,
+}
+
+impl HealpixCell {
+    /// The cell that holds a direction, where each face is divided into `side` × `side`.
+    pub fn of(direction: &UnitVector<Icrs>, side: u32) -> Self {
+        let (ra_rad, _) = direction.to_ra_dec();
+        let z = direction.as_vector().z;
+        let quarters = (ra_rad / FRAC_PI_2).rem_euclid(4.0);
+        let (face, u, v) = if z.abs() <= 2.0 / 3.0 {
+            equatorial(z, quarters)
+        } else {
+            polar(direction.as_vector(), quarters)
+        };
+        let along = |share: f64| ((share * f64::from(side)).max(0.0) as u32).min(side - 1);
+        Self {
+            face,
+            x: along(u),
+            y: along(v),
+        }
+    }
+
+    /// Its number in the scheme of astrometry.net: face by face, x by x.
+    pub const fn number_by_face(self, side: u32) -> u32 {
+        (self.face * side + self.x) * side + self.y
+    }
+}
+
+/// The face, and the place there from 0 to 1, near the equator.
+fn equatorial(z: f64, quarters: f64) -> (u32, f64, f64) {
+    // Lines of constant x and y are straight in z and right ascension.
+    let rising = 0.5 + quarters - 0.75 * z;
+    let falling = 0.5 + quarters + 0.75 * z;
+    let (row, column) = (rising.floor(), falling.floor());
+    let of_four = |number: f64| number.rem_euclid(4.0) as u32;
+    let face = if row == column {
+        of_four(row) + 4
+    } else if row < column {
+        of_four(row)
+    } else {
+        of_four(column) + 8
+    };
+    (face, falling - column, 1.0 - (rising - row))
+}
+
+/// The same, near a pole.
+fn polar(direction: &Vector3<f64>, quarters: f64) -> (u32, f64, f64) {
+    let quarter = quarters.floor().min(3.0);
+    let within = quarters - quarter;
+    let z = direction.z.abs();
+    // 1 − |z|, without loss at the pole.
+    let from_pole = (direction.x.powi(2) + direction.y.powi(2)) / (1.0 + z);
+    let height = (3.0 * from_pole).sqrt();
+    let (east, west) = (within * height, (1.0 - within) * height);
+    if direction.z > 0.0 {
+        (quarter as u32, 1.0 - west, 1.0 - east)
+    } else {
+        (quarter as u32 + 8, east, west)
+    }
+}
+
+/// Directions that lie in every cell that a cone reaches, if cells are not much smaller than a third of it: its
+/// centre, and points on circles around it.
+pub fn samples(centre: &UnitVector<Icrs>, radius_rad: f64) -> Vec<UnitVector<Icrs>> {
+    const CIRCLES: u32 = 4;
+    const ON_CIRCLE: u32 = 24;
+    /// Cones are taken this much larger.
+    const MARGIN_RAD: f64 = 0.1 * RAD_PER_DEG;
+    let (east, north) = centre.east_north();
+    let mut samples = vec![*centre];
+    for circle in 1..=CIRCLES {
+        let apart_rad = (radius_rad + MARGIN_RAD) * f64::from(circle) / f64::from(CIRCLES);
+        let (sin, cos) = libm::sincos(apart_rad);
+        samples.extend((0..ON_CIRCLE).map(|number| {
+            let angle_rad = TAU * f64::from(number) / f64::from(ON_CIRCLE);
+            let (to_east, to_north) = libm::sincos(angle_rad);
+            let across = east * to_east + north * to_north;
+            UnitVector::from_vector(centre.as_vector() * cos + across * sin)
+        }));
+    }
+    samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    #[test]
+    fn cells_have_equal_areas() {
+        let side = 4;
+        let mut counts: HashMap<u32, u32> = HashMap::new();
+        let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+        let points = 192 * 400;
+        for number in 0..points {
+            let z = 1.0 - (2.0 * f64::from(number) + 1.0) / f64::from(points);
+            let direction = UnitVector::from_ra_dec(f64::from(number) * golden, libm::asin(z));
+            let cell = HealpixCell::of(&direction, side);
+            *counts.entry(cell.number_by_face(side)).or_default() += 1;
+        }
+        assert_eq!(counts.len(), 192);
+        assert!(counts.keys().all(|number| *number < 192));
+        let range = counts.values().min().unwrap()..=counts.values().max().unwrap();
+        assert!(*range.start() > 380 && *range.end() < 420, "{range:?}");
+    }
+
+    /// Centres of faces, from the paper's figure 4.
+    #[test]
+    fn faces_are_numbered_from_the_north() {
+        let face = |ra_deg: f64, dec_deg: f64| {
+            let direction = UnitVector::from_ra_dec(ra_deg * RAD_PER_DEG, dec_deg * RAD_PER_DEG);
+            HealpixCell::of(&direction, 1).number_by_face(1)
+        };
+        for quarter in 0..4 {
+            let ra_deg = 90.0 * f64::from(quarter);
+            assert_eq!(face(ra_deg + 45.0, 41.8), quarter);
+            assert_eq!(face(ra_deg, 0.0), quarter + 4);
+            assert_eq!(face(ra_deg + 45.0, -41.8), quarter + 8);
+            assert_eq!(face(ra_deg + 45.0, 89.9), quarter);
+            assert_eq!(face(ra_deg + 1.0, -80.0), quarter + 8);
+        }
+    }
+}

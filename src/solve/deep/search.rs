@@ -1,0 +1,140 @@
+//! The search for a narrow field.
+
+use super::plan::{attempts, is_narrow};
+use super::sky::{DeepSky, Indexed};
+use crate::base::interrupt::Interrupt;
+use crate::base::size::Size;
+use crate::base::units::RAD_PER_DEG;
+use crate::catalog::deep::Region;
+use crate::identify::{Identification, Priors, ScalePrior, SkyRegion};
+use crate::solve::context::Context;
+use crate::solve::outcome::Outcome;
+
+/// What an identification answers.
+pub trait Answered {
+    /// The stars and the attitude, or why they were not found.
+    fn outcome(&self) -> &Outcome;
+    /// The same, to change it.
+    fn outcome_mut(&mut self) -> &mut Outcome;
+}
+
+/// Identifies a frame of this size with the catalogue of all frames or with deep ones: with these first where the
+/// field is stated to be narrow. `identify` does so with the catalogue of a context and with priors. Also returns the
+/// stars of the deep one that are named.
+pub fn identify_in_all<T: Answered>(
+    (context, priors): (&Context, &Priors),
+    size: Size,
+    interrupt: &Interrupt,
+    mut identify: impl FnMut(&Context, &Priors) -> T,
+) -> (T, Option<Indexed>) {
+    let Some(deep) = context.deep else {
+        return (identify(context, priors), None);
+    };
+    let frame = DeepSearch {
+        deep,
+        context,
+        priors,
+        size,
+        interrupt,
+    };
+    let is_narrow = is_narrow(priors, size.width as f64);
+    if is_narrow && let Some((found, named)) = frame.search(&mut identify) {
+        return (found, Some(named));
+    }
+    let found = identify(context, priors);
+    if is_narrow || found.outcome().identification().is_some() {
+        return (found, None);
+    }
+    match frame.search(&mut identify) {
+        Some((found, named)) => (found, Some(named)),
+        None => (found, None),
+    }
+}
+
+/// The search of a frame in deep catalogues.
+struct DeepSearch<'a> {
+    deep: &'a DeepSky,
+    context: &'a Context<'a>,
+    priors: &'a Priors,
+    size: Size,
+    interrupt: &'a Interrupt,
+}
+
+impl DeepSearch<'_> {
+    /// Searches part by part of the sky. Returns the answer, and the stars that it names.
+    fn search<T: Answered>(
+        &self,
+        identify: &mut impl FnMut(&Context, &Priors) -> T,
+    ) -> Option<(T, Indexed)> {
+        for number in 0..self.deep.catalogs().len() {
+            for attempt in attempts(self.priors, self.size, self.deep.narrowest_rad(number)) {
+                if self.interrupt.is_due() {
+                    return None;
+                }
+                let Some(indexed) = self.deep.indexed(number, &attempt, self.interrupt) else {
+                    continue;
+                };
+                let priors = Priors {
+                    near: attempt.near,
+                    ..*self.priors
+                };
+                let found = identify(&self.context.over(&indexed), &priors);
+                if let Some(first) = found.outcome().identification() {
+                    let named = self.named(number, first, identify);
+                    return Some(named.unwrap_or((found, indexed)));
+                }
+            }
+        }
+        None
+    }
+
+    /// What was found first, with all stars around it; `None` where these do not confirm it.
+    fn named<T: Answered>(
+        &self,
+        number: usize,
+        first: &Identification,
+        identify: &mut impl FnMut(&Context, &Priors) -> T,
+    ) -> Option<(T, Indexed)> {
+        /// How far the frame's centre and its scale may be from those that were found.
+        const APART: f64 = 0.02;
+        let (fov_rad, radius_rad) = (first.camera.fov_x_rad()?, first.camera.radius_rad());
+        let region = region_around(first);
+        let known = self.context.indexed.catalog();
+        let indexed = self
+            .deep
+            .around(number, region, fov_rad, known, self.interrupt)?;
+        let scale_rad = 1.0 / first.camera.central_focal_length_px();
+        let priors = Priors {
+            near: Some(SkyRegion {
+                centre: region.centre,
+                radius_rad: APART * radius_rad,
+            }),
+            scale: Some(ScalePrior::between(
+                scale_rad * (1.0 - APART),
+                scale_rad * (1.0 + APART),
+            )),
+            ..*self.priors
+        };
+        let mut again = identify(&self.context.over(&indexed), &priors);
+        let Outcome::Identified(second) = again.outcome_mut() else {
+            return None;
+        };
+        // The first search had to choose among many more hypotheses.
+        second.log10_false_alarm = second.log10_false_alarm.max(first.log10_false_alarm);
+        Some((again, indexed))
+    }
+}
+
+/// The part of the sky around an answer, with as many stars as detections can be.
+fn region_around(found: &Identification) -> Region {
+    /// Room beyond the corners, over their distance from the centre.
+    const ROOM: f64 = 1.1;
+    /// Most stars in a frame that are of use.
+    const MOST: f64 = 6000.0;
+    let area_sq_deg = found.camera.solid_angle_sr() / RAD_PER_DEG.powi(2);
+    Region {
+        centre: found.icrs_to_camera.boresight(),
+        radius_rad: ROOM * found.camera.radius_rad(),
+        per_sq_deg: MOST / area_sq_deg,
+    }
+}
