@@ -29,7 +29,7 @@ impl<'a> View<'a> {
         Self {
             solution,
             found,
-            catalog,
+            catalog: solution.catalog(catalog),
             places: PlaceErrors::new(solution, found),
             field_deg: field_rad * DEG_PER_RAD,
         }

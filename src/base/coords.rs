@@ -86,7 +86,7 @@ impl<S> UnitVector<S> {
     }
 
     /// The direction of `vector`, whose length must be one.
-    pub fn from_unit(vector: Vector3<f64>) -> Self {
+    pub const fn from_unit(vector: Vector3<f64>) -> Self {
         Self {
             vector,
             system: PhantomData,

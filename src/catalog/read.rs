@@ -1,8 +1,9 @@
 //! Reads a catalogue, a file or a directory, whose kind is detected from its content.
 
+use super::deep::{DeepCatalog, Region};
 use super::import::{
-    CatalogPart, ImportRows, ImportSummary, ImportTally, LoadedCatalog, OpenedFile, RowParser,
-    SourceFile, combine,
+    CatalogPart, ImportRows, ImportSummary, ImportTally, LoadedCatalog, MAX_RECORDS, OpenedFile,
+    RowParser, SourceFile, combine,
 };
 use super::sky2000::FixedWidth;
 use super::table::CatalogTable;
@@ -74,11 +75,37 @@ pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, C
 /// As for [`Catalog::read`]; [`CatalogError::UnknownKind`] also for a compact catalogue, which has
 /// no records.
 pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
+    let deep = DeepCatalog::find(path)?;
+    if let Some(deep) = deep.first() {
+        return import_deep(deep);
+    }
     let reading = read(path)?;
     if reading.files.is_empty() {
         return Err(CatalogError::already_compact(path));
     }
     Ok(reading)
+}
+
+/// Reads all stars of a catalogue that is otherwise read region by region.
+fn import_deep(deep: &DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
+    let contents = deep.contents();
+    if contents.stars > MAX_RECORDS {
+        let (path, limit) = (deep.path().to_owned(), MAX_RECORDS);
+        return Err(CatalogError::TooManyRecords { path, limit });
+    }
+    let stars = deep.stars_in(Region::WHOLE_SKY, &Interrupt::default())?;
+    let summary = ImportSummary {
+        records: contents.stars,
+        stars: stars.len() as u64,
+        ..ImportSummary::default()
+    };
+    let files = vec![SourceFile {
+        path: deep.path().to_owned(),
+        kind: format!("{}, magnitudes: {}", contents.kind, contents.band),
+        summary,
+    }];
+    let catalog = Catalog::new(contents.kind, stars, Vec::new())?;
+    Ok(LoadedCatalog { catalog, files })
 }
 
 /// The kind of a file, as far as its first bytes tell.

@@ -56,6 +56,7 @@ impl FrameReport {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(frame: &str, solution: &Solution, catalog: &Catalog) -> Self {
+        let catalog = solution.catalog(catalog);
         let mut report = Self {
             schema: SCHEMA,
             frame: frame.to_owned(),
@@ -101,6 +102,9 @@ impl FrameReport {
             }
             Outcome::Identified(identification) => {
                 report.add_identification(identification, catalog, solution.attitude_frame);
+                if let Some(matched) = &mut report.matched {
+                    matched.catalog = solution.deep_title().map(str::to_owned);
+                }
                 // The faintest of the brightest stars says nothing.
                 report.magnitude = report.magnitude.take().filter(|_| !solution.attitude_only);
                 bodies::add_to(&mut report, &solution.bodies, identification);
@@ -319,6 +323,7 @@ fn match_quality(identification: &Identification, detected: usize) -> MatchRepor
         rms_px: to_decimals(identification.rms_px, PIXEL_DECIMALS),
         rms_arcsec: to_significant(identification.rms_px * pixel_arcsec, SIGMA_DIGITS),
         log10_false_alarm: to_decimals(identification.log10_false_alarm, 2),
+        catalog: None,
     }
 }
 

@@ -350,6 +350,9 @@ pub struct MatchReport {
     pub rms_arcsec: f64,
     /// log10 of the false-alarm probability.
     pub log10_false_alarm: f64,
+    /// The deep catalogue that it took, for people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub catalog: Option<String>,
 }
 
 /// The faintest identified star, compared with the prediction.

@@ -60,7 +60,8 @@ fn cause_text(cause: &Diagnosis) -> String {
             fov_x_rad,
             source,
             narrowest_rad,
-        } => too_narrow(*fov_x_rad, *source, *narrowest_rad),
+            stars,
+        } => too_narrow(*fov_x_rad, *source, *narrowest_rad, *stars),
         Diagnosis::HintsExclude(excluded) => excluded_text(excluded),
         seen => picture_text(seen),
     }
@@ -146,18 +147,28 @@ fn black(hot_pixels: usize) -> String {
     format!("the picture is black, with only noise{hot}; uncover the lens, or expose longer")
 }
 
-fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64) -> String {
+fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64, stars: f64) -> String {
     let stated = match source {
         ScaleSource::User => "that was given",
         ScaleSource::Camera => "from the camera description",
         ScaleSource::Header => "from the file's header",
     };
     format!(
-        "the field of view {stated}, {} wide, is too narrow for this catalog, which has enough stars for \
-         fields of {} or more; use a catalog with fainter stars",
+        "the field of view {stated}, {} wide, is too narrow for the catalog: {} expected in this field, and \
+         fields of {} or more have enough; use a catalog with fainter stars",
         range(fov_x_rad),
+        expected(stars),
         degrees(narrowest_rad),
     )
+}
+
+/// How many stars are expected.
+fn expected(stars: f64) -> String {
+    match stars.round() {
+        0.0 => "less than 1 star is".to_owned(),
+        1.0 => "1 star is".to_owned(),
+        stars => format!("{stars:.0} stars are"),
+    }
 }
 
 fn too_few(found: usize, needed: usize, solution: &Solution) -> String {

@@ -257,6 +257,7 @@ fn identified() -> FrameReport {
             rms_px: 0.0712,
             rms_arcsec: 5.06,
             log10_false_alarm: -65.21,
+            catalog: None,
         }),
         magnitude: Some(MagnitudeReport {
             faintest_vmag: 7.321,

@@ -34,6 +34,11 @@ impl FrameReport {
     pub fn to_text(&self, options: TextOptions) -> String {
         let mut lines = self.headline(options.option_names);
         lines.extend(self.matched.iter().map(identified_line));
+        let deep = self
+            .matched
+            .iter()
+            .filter_map(|matched| matched.catalog.as_deref());
+        lines.extend(deep.map(|title| labelled("catalog", title)));
         lines.push(labelled(
             "picture",
             &format!("{} × {} px", self.width, self.height),

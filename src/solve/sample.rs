@@ -18,6 +18,7 @@ pub(crate) fn solution(width: usize, height: usize, outcome: Outcome) -> Solutio
         site: None,
         photometry: None,
         sky: None,
+        deep: None,
         comparison: None,
         gain_e_per_adu: None,
         calibration: None,

@@ -68,7 +68,7 @@ pub struct Solution {
     /// The sky at each place of an identified frame, where it was wanted.
     pub sky: Option<SkyMap>,
     /// The stars that the frame's are, where it took a deep catalogue.
-    pub(super) deep: Option<SolvedSky>,
+    pub(crate) deep: Option<SolvedSky>,
     /// Comparison with the stated camera, where there is one and the exposure is known.
     pub comparison: Option<Comparison>,
     /// Gain of the stated camera, in electrons per ADU.
@@ -81,7 +81,7 @@ pub struct Solution {
 
 /// The stars around a frame, of a deep catalogue.
 #[derive(Clone)]
-pub(super) struct SolvedSky(pub Arc<IndexedCatalog<'static>>);
+pub(crate) struct SolvedSky(pub Arc<IndexedCatalog<'static>>);
 
 impl fmt::Debug for SolvedSky {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -95,6 +95,11 @@ impl Solution {
     /// The catalogue that its stars are of: `usual`, which frames are solved with, unless it took a deep one.
     pub fn catalog<'a>(&'a self, usual: &'a Catalog) -> &'a Catalog {
         self.deep.as_ref().map_or(usual, |deep| deep.0.catalog())
+    }
+
+    /// The title of the deep catalogue, where it took one.
+    pub(crate) fn deep_title(&self) -> Option<&str> {
+        self.deep.as_ref().map(|deep| deep.0.catalog().title())
     }
 
     /// One source.

@@ -360,6 +360,7 @@ fn a_closed_pipe_is_no_panic() {
         .args(["process", "--format", "json"])
         .args(vec![orion(); 5])
         .env("STARPIPE_CACHE_DIR", cache_dir())
+        .env("STARPIPE_CATALOGS", "")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -95,6 +95,7 @@ fn inputs() -> tempfile::TempDir {
 fn program(work: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
     command.env("STARPIPE_CACHE_DIR", work.join("cache"));
+    command.env("STARPIPE_CATALOGS", "");
     command.stdout(Stdio::null()).stderr(Stdio::piped());
     command
 }
@@ -151,6 +152,7 @@ impl Writes {
             .arg(format!("ulimit {limit} && exec \"$0\" \"$@\""));
         command.arg(whole.get_program()).args(whole.get_args());
         command.env("STARPIPE_CACHE_DIR", work.join("cache"));
+        command.env("STARPIPE_CATALOGS", "");
         command.stdout(Stdio::null()).stderr(Stdio::piped());
         command
     }

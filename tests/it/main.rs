@@ -17,6 +17,7 @@ mod common;
 mod comparison;
 mod completeness;
 mod darks;
+mod deep;
 mod defocus;
 mod detect;
 mod diagnosis;

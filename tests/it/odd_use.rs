@@ -281,7 +281,8 @@ fn a_pipe_is_read_like_a_file_and_an_endless_stream_is_refused() {
     shell
         .args(["-c", script, env!("CARGO_BIN_EXE_starpipe")])
         .arg(orion())
-        .env("STARPIPE_CACHE_DIR", cache);
+        .env("STARPIPE_CACHE_DIR", cache)
+        .env("STARPIPE_CATALOGS", "");
     let Ok(ran) = shell.output() else {
         eprintln!("skipped: no bash");
         return;
@@ -327,6 +328,7 @@ fn errors_that_cannot_be_printed_set_the_exit_status() {
     let status = Command::new(env!("CARGO_BIN_EXE_starpipe"))
         .args(["process", "missing.png"])
         .env("STARPIPE_CACHE_DIR", cache_dir())
+        .env("STARPIPE_CATALOGS", "")
         .stderr(Stdio::from(full))
         .status()
         .unwrap();
@@ -343,6 +345,7 @@ fn a_full_standard_output_is_a_failure() {
         .arg("process")
         .arg(orion())
         .env("STARPIPE_CACHE_DIR", cache_dir())
+        .env("STARPIPE_CATALOGS", "")
         .stdout(Stdio::from(full))
         .output()
         .unwrap();
@@ -363,6 +366,7 @@ fn a_closed_standard_output_is_a_failure_and_dev_null_is_none() {
             .arg("process")
             .arg(orion())
             .env("STARPIPE_CACHE_DIR", &cache)
+            .env("STARPIPE_CATALOGS", "")
             .output()
             .unwrap();
         assert_eq!(ran.status.code(), Some(expected), "{redirection} {ran:?}");

@@ -15,7 +15,8 @@ fn shown(before: &str, format: &str, redirect: &str) -> Option<String> {
     // The bar needs a terminal that can move its cursor.
     script
         .env("TERM", "xterm")
-        .env("STARPIPE_CACHE_DIR", cache_dir());
+        .env("STARPIPE_CACHE_DIR", cache_dir())
+        .env("STARPIPE_CATALOGS", "");
     match script.output() {
         Ok(done) if done.status.success() => Some(String::from_utf8(done.stdout).unwrap()),
         Ok(done) => panic!("{}", String::from_utf8_lossy(&done.stdout)),

@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(counts.len(), 192);
         assert!(counts.keys().all(|number| *number < 192));
         let range = counts.values().min().unwrap()..=counts.values().max().unwrap();
-        assert!(*range.start() > 380 && *range.end() < 420, "{range:?}");
+        assert!(**range.start() > 380 && **range.end() < 420, "{range:?}");
     }
 
     /// Centres of faces, from the paper's figure 4.

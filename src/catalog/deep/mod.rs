@@ -21,14 +21,16 @@ pub use error::Damage;
 pub use installed::installed_paths;
 pub use region::Region;
 
-use super::{CatalogError, Star};
+use super::{Catalog, CatalogError, Star};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use astap::{AreaDatabase, WideDatabase};
 use astrometry::IndexFile;
 use region::BrightestStars;
 use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
 use stored::StoredCatalog;
+use xxhash_rust::xxh3::Xxh3;
 
 /// Area of the whole sky.
 const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
@@ -72,6 +74,17 @@ pub struct DeepContents {
 }
 
 impl DeepContents {
+    /// Those of a catalogue in memory.
+    pub fn of(catalog: &Catalog) -> Self {
+        Self {
+            kind: catalog.title().to_owned(),
+            band: "Johnson V".to_owned(),
+            stars: catalog.stars().len() as u64,
+            share_of_sky: 1.0,
+            epoch_year: Some(catalog.epoch_year()),
+        }
+    }
+
     /// Mean density of the stars where it covers the sky.
     pub fn per_sq_deg(&self) -> f64 {
         self.stars as f64 / (WHOLE_SKY_SQ_DEG * self.share_of_sky.max(1e-9))
@@ -172,6 +185,25 @@ impl DeepCatalog {
                 epoch_year: Some(summary.epoch_year),
             },
         }
+    }
+
+    /// Changes when one of its files does: with its place, its length or the time at which it was written.
+    pub fn fingerprint(&self) -> u64 {
+        let files: Vec<&Path> = match &self.stock {
+            Stock::Indexes(indexes) => indexes.iter().map(|index| &*index.path).collect(),
+            Stock::Areas(database) => database.files().collect(),
+            Stock::Wide(_) | Stock::Stored(_) => vec![&self.path],
+        };
+        let mut state = Xxh3::new();
+        for file in files {
+            let found = file.metadata().ok();
+            let modified = found.as_ref().and_then(|found| found.modified().ok());
+            let since = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+            state.update(file.as_os_str().as_encoded_bytes());
+            state.update(&found.map_or(0, |found| found.len()).to_le_bytes());
+            state.update(&since.map_or(0, |since| since.as_nanos()).to_le_bytes());
+        }
+        state.digest()
     }
 
     /// The brightest stars of a region, as many as it wants, brightest first.

@@ -6,6 +6,7 @@ use crate::catalog::sky_cells::SkyCells;
 use crate::catalog::sky_grid::chord_of;
 use crate::catalog::star::mmag;
 use crate::catalog::{Star, StarId};
+use nalgebra::Vector3;
 use std::collections::{BinaryHeap, HashMap};
 use std::f64::consts::PI;
 
@@ -24,6 +25,13 @@ pub struct Region {
 }
 
 impl Region {
+    /// All stars.
+    pub const WHOLE_SKY: Self = Self {
+        centre: UnitVector::from_unit(Vector3::new(1.0, 0.0, 0.0)),
+        radius_rad: PI,
+        per_sq_deg: f64::INFINITY,
+    };
+
     /// Its area.
     pub fn area_sq_deg(&self) -> f64 {
         let half = libm::sin(self.radius_rad.clamp(0.0, PI) / 2.0);

@@ -14,6 +14,6 @@ mod tally;
 pub(super) use combine::{CatalogPart, combine};
 pub use combine::{LoadedCatalog, SourceFile};
 pub(super) use opened::OpenedFile;
-pub(super) use rows::{ImportRows, Row};
+pub(super) use rows::{ImportRows, MAX_RECORDS, Row};
 pub use summary::ImportSummary;
 pub(super) use tally::{ImportTally, NamedStar, Parsed, Rejection, RowParser, both_or_neither};

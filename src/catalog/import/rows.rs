@@ -14,7 +14,7 @@ const BATCH_ROWS: usize = 1 << 17;
 const MAX_ROW_BYTES: usize = 1 << 16;
 
 /// Most records of a file: twice those of Tycho-2.
-pub(super) const MAX_RECORDS: u64 = 5_000_000;
+pub(in crate::catalog) const MAX_RECORDS: u64 = 5_000_000;
 /// Most lines of a file, whatever is in them: twice as many as there may be records.
 const MAX_LINES: u64 = 2 * MAX_RECORDS;
 

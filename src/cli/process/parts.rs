@@ -66,8 +66,7 @@ impl Sink for TableRowSink<'_> {
     type Made = (FrameRow, Vec<StarRow>);
 
     fn make(&self, image: &ImageName, solved: &SolvedImage) -> Self::Made {
-        let catalog = solved.solution.catalog(self.0);
-        let report = FrameReport::new(&image.to_string(), &solved.solution, catalog);
+        let report = FrameReport::new(&image.to_string(), &solved.solution, self.0);
         let stars = StarRow::of_frame(&report).collect();
         (FrameRow::new(&report, &solved.solution), stars)
     }

@@ -114,9 +114,8 @@ impl Sink for Reports<'_> {
     type Made = Report;
 
     fn make(&self, image: &ImageName, solved: &SolvedImage) -> Report {
-        let catalog = solved.solution.catalog(self.catalog);
-        let report = FrameReport::new(&image.to_string(), &solved.solution, catalog);
-        let failures = self.files.save(image, solved, &report, catalog);
+        let report = FrameReport::new(&image.to_string(), &solved.solution, self.catalog);
+        let failures = self.files.save(image, solved, &report, self.catalog);
         let row = self
             .needs_rows
             .then(|| FrameRow::new(&report, &solved.solution));

@@ -47,6 +47,8 @@ pub enum Diagnosis {
         source: ScaleSource,
         /// The narrowest horizontal field of view that the catalogue allows, in radians.
         narrowest_rad: f64,
+        /// Mean number of its stars in a field in the middle of the range.
+        stars: f64,
     },
     /// Without the priors the stars are identified.
     HintsExclude(Box<Excluded>),

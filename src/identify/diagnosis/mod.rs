@@ -29,6 +29,7 @@ pub(crate) use doubles::find_unnamed as find_double_image;
 pub(crate) use picture::{Unexplained, bytes as picture_bytes};
 pub use repeats::{RepeatedSky, find as find_repeated_sky};
 
+use crate::base::units::DEG_PER_RAD;
 use crate::camera::focal_length_px;
 use crate::detect::Detections;
 use crate::frame::Frame;
@@ -108,9 +109,12 @@ fn too_narrow(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
     let scale = stated.pixel_scale_range_rad(width_px);
     let [narrowest_rad, _] = sky.fov_range_rad();
     let narrowest_pixel_rad = 1.0 / focal_length_px(width_px, narrowest_rad);
+    let pixel_deg = (scale[0] + scale[1]) / 2.0 * DEG_PER_RAD;
+    let area_sq_deg = pixel_deg * pixel_deg * width_px * case.field.height_px;
     (scale[1] < narrowest_pixel_rad).then(|| Diagnosis::TooNarrow {
         fov_x_rad: fields_of_view(scale, width_px),
         source: stated.source,
         narrowest_rad,
+        stars: area_sq_deg * sky.per_sq_deg(),
     })
 }

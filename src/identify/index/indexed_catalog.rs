@@ -312,6 +312,11 @@ impl<'a> IndexedCatalog<'a> {
         (stars * whole * radius_rad * radius_rad / 4.0).max(1e-9)
     }
 
+    /// Mean density of its stars.
+    pub(crate) fn per_sq_deg(&self) -> f64 {
+        self.stars().len() as f64 / self.area_sq_deg
+    }
+
     /// The limiting V magnitude at which the mean density of stars is `per_sq_deg`.
     pub fn magnitude_of_density(&self, per_sq_deg: f64) -> f64 {
         let rank = (per_sq_deg * self.area_sq_deg) as usize;

@@ -94,6 +94,7 @@ fn drawing(
     options: &OverlayOptions,
 ) -> (Canvas, Picture) {
     let picture = Picture::draw(shown, solution.background.as_ref(), options);
+    let catalog = solution.catalog(catalog);
     let scene = Scene::of(solution, catalog);
     let marks = mark::marks(solution, scene.as_ref(), catalog, &picture, options.label);
     let unit = picture.stroke_unit();

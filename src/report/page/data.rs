@@ -76,6 +76,7 @@ impl<'a> StarColumns<'a> {
 impl<'a> PageData<'a> {
     /// The numbers of a frame.
     pub(super) fn new(report: &'a FrameReport, solution: &Solution, catalog: &Catalog) -> Self {
+        let catalog = solution.catalog(catalog);
         let photometry = report.photometry.as_ref();
         let is_rate = photometry.is_some_and(|photometry| photometry.flux_unit.ends_with("/s"));
         let unlike = |(_, star): &(usize, &StarReport)| !star.is_star_like();

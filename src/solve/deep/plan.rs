@@ -44,7 +44,8 @@ pub fn is_narrow(priors: &Priors, width_px: f64) -> bool {
     fov_range_rad(priors, width_px).is_some_and(|[_, widest]| widest < WIDE_RAD)
 }
 
-/// What is searched, the most likely first, in a catalogue whose narrowest field is this; nothing for wide fields.
+/// What is searched, the most likely first, in a catalogue whose narrowest field is this on average; nothing for wide
+/// fields.
 pub fn attempts(priors: &Priors, size: Size, narrowest_rad: f64) -> Vec<Attempt> {
     let [width_px, height_px] = size.sides().map(|side| side as f64);
     let known = fov_range_rad(priors, width_px);
@@ -52,16 +53,14 @@ pub fn attempts(priors: &Priors, size: Size, narrowest_rad: f64) -> Vec<Attempt>
         return Vec::new();
     }
     let [low, high] = known.unwrap_or([NARROWEST_RAD, WIDEST_RAD]);
-    let low = low.max(BELOW_NARROWEST * narrowest_rad);
     let fov_range_rad = [low, high.min(MAX_RAD)];
-    if low >= fov_range_rad[1] {
-        return Vec::new();
-    }
     let hints = priors.near.into_iter().chain(priors.mount);
     let mut attempts: Vec<Attempt> = hints
         .map(|near| near_attempt(near, fov_range_rad, height_px / width_px))
         .collect();
-    if priors.near.is_none() && fov_range_rad[1] > FIELDS_OF_SKY_RAD[0] {
+    // Here and there it has more stars than on average.
+    let narrowest_rad = FIELDS_OF_SKY_RAD[0].max(BELOW_NARROWEST * narrowest_rad);
+    if priors.near.is_none() && fov_range_rad[1] > narrowest_rad {
         attempts.push(Attempt {
             region: None,
             near: None,

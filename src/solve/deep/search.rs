@@ -6,9 +6,10 @@ use crate::base::interrupt::Interrupt;
 use crate::base::size::Size;
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::deep::Region;
-use crate::identify::{Identification, Priors, ScalePrior, SkyRegion};
+use crate::identify::diagnosis::Diagnosis;
+use crate::identify::{Identification, Priors, ScalePrior, SearchFailure, SkyRegion};
 use crate::solve::context::Context;
-use crate::solve::outcome::Outcome;
+use crate::solve::outcome::{Outcome, Reason};
 
 /// What an identification answers.
 pub trait Answered {
@@ -41,14 +42,15 @@ pub fn identify_in_all<T: Answered>(
     if is_narrow && let Some((found, named)) = frame.search(&mut identify) {
         return (found, Some(named));
     }
-    let found = identify(context, priors);
-    if is_narrow || found.outcome().identification().is_some() {
+    let mut found = identify(context, priors);
+    if found.outcome().identification().is_some() {
         return (found, None);
     }
-    match frame.search(&mut identify) {
-        Some((found, named)) => (found, Some(named)),
-        None => (found, None),
+    if !is_narrow && let Some((found, named)) = frame.search(&mut identify) {
+        return (found, Some(named));
     }
+    frame.explain(found.outcome_mut());
+    (found, None)
 }
 
 /// The search of a frame in deep catalogues.
@@ -86,6 +88,34 @@ impl DeepSearch<'_> {
             }
         }
         None
+    }
+
+    /// A field that is too narrow for the catalogue of all frames may be wide enough for the densest of the deep ones:
+    /// then it has another cause that it is not identified.
+    fn explain(&self, outcome: &mut Outcome) {
+        let Outcome::NotIdentified(Reason::Diagnosis(Diagnosis::TooNarrow {
+            fov_x_rad,
+            narrowest_rad,
+            stars,
+            ..
+        })) = outcome
+        else {
+            return;
+        };
+        let Some((_, contents)) = self.deep.catalogs().first() else {
+            return;
+        };
+        let width_deg = (fov_x_rad[0] + fov_x_rad[1]) / 2.0 / RAD_PER_DEG;
+        let aspect = self.size.height as f64 / self.size.width as f64;
+        *narrowest_rad = contents.narrowest_fov_deg() * RAD_PER_DEG;
+        *stars = width_deg * width_deg * aspect * contents.per_sq_deg();
+        if fov_x_rad[1] >= *narrowest_rad {
+            let best_log10_false_alarm = None;
+            let failure = SearchFailure::NoMatch {
+                best_log10_false_alarm,
+            };
+            *outcome = Outcome::NotIdentified(Reason::Search(failure));
+        }
     }
 
     /// What was found first, with all stars around it; `None` where these do not confirm it.

@@ -2,19 +2,20 @@
 
 use super::around::merged;
 use super::plan::{Attempt, FIELDS_OF_SKY_RAD, MAX_STARS};
-use crate::base::coords::UnitVector;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::deep::{DeepCatalog, DeepContents, Region};
 use crate::catalog::{Catalog, CatalogError};
 use crate::identify::{IndexedCatalog, SearchedPart};
 use std::collections::HashMap;
-use std::f64::consts::PI;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Density of the stars of the whole sky that are indexed, where there are as many.
 const PER_SQ_DEG_OF_SKY: f64 = MAX_STARS / 41_252.96;
+
+/// Version of the stars in the cache: it changes with what is read of catalogues, and with how stars are chosen.
+const STARS_VERSION: u32 = 1;
 
 /// How far the index of the whole sky is built.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -197,6 +198,27 @@ impl DeepSky {
         Some(made)
     }
 
+    /// The stars of a region, from the cache if they are there: to choose them takes longer than to read them.
+    fn stars_of(&self, number: usize, region: Region, interrupt: &Interrupt) -> Option<Catalog> {
+        let deep = &self.catalogs()[number].0;
+        let name = format!("stars-{:016x}-v{STARS_VERSION}.cat", deep.fingerprint());
+        let path = self
+            .cache_directory
+            .as_ref()
+            .map(|directory| directory.join(name));
+        if let Some(kept) = path.as_deref().and_then(|path| Catalog::read(path).ok()) {
+            return Some(kept);
+        }
+        let stars = self.kept(deep.stars_in(region, interrupt))?;
+        let catalog = self.kept(Catalog::new(self.title(number), stars, Vec::new()))?;
+        if let Some(path) = path {
+            // Without it the next process takes longer. The index beside it tells why it cannot be kept.
+            let _ = path.parent().map(std::fs::create_dir_all);
+            let _ = catalog.write_compact(&path);
+        }
+        Some(catalog)
+    }
+
     fn make_whole_sky(
         &self,
         number: usize,
@@ -208,13 +230,11 @@ impl DeepSky {
             }
         };
         let whole_sky = Region {
-            centre: UnitVector::from_ra_dec(0.0, 0.0),
-            radius_rad: PI,
             per_sq_deg: PER_SQ_DEG_OF_SKY,
+            ..Region::WHOLE_SKY
         };
-        let stars = self.kept(self.catalogs()[number].0.stars_in(whole_sky, interrupt))?;
-        tell(DeepProgress::Stars(stars.len()));
-        let catalog = self.kept(Catalog::new(self.title(number), stars, Vec::new()))?;
+        let catalog = self.stars_of(number, whole_sky, interrupt)?;
+        tell(DeepProgress::Stars(catalog.stars().len()));
         let part = SearchedPart {
             area_sq_deg: whole_sky.area_sq_deg(),
             fov_range_rad: FIELDS_OF_SKY_RAD,

@@ -43,10 +43,11 @@ pub fn cache_dir() -> PathBuf {
     )
 }
 
-/// The program, with the cache of the tests.
+/// The program, with the cache of the tests, and without the catalogues that are installed.
 pub fn starpipe() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
     command.env("STARPIPE_CACHE_DIR", cache_dir());
+    command.env("STARPIPE_CATALOGS", "");
     command
 }
 

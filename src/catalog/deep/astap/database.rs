@@ -69,6 +69,11 @@ impl AreaDatabase {
         found.into_iter().map(open).collect()
     }
 
+    /// Its files.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.values().map(PathBuf::as_path)
+    }
+
     /// The epoch of its positions, where it is stated.
     pub const fn epoch_year(&self) -> Option<f64> {
         self.header.epoch_year

@@ -1,0 +1,153 @@
+//! Narrow fields are identified with deep catalogues, with right and wrong hints, and never wrongly.
+
+use super::areas;
+use super::index_file::{Series, index_file};
+use super::patch::{Patch, near};
+use crate::common::sky;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
+use starpipe::base::coords::{Icrs, Rotation, UnitVector};
+use starpipe::base::units::RAD_PER_DEG;
+use starpipe::catalog::deep::DeepCatalog;
+use starpipe::centroids::ListedCentroid;
+use starpipe::identify::{Photometry, Scale, SkyRegion};
+use starpipe::solve::DeepSky;
+use starpipe::{
+    CameraModel, CentroidList, Context, Priors, ScalePrior, Workspace, solve_centroids,
+};
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
+
+const SIZE: [u32; 2] = [1600, 1200];
+const FIELDS: usize = 20;
+
+/// A frame of a part of the sky, and where it points.
+struct Field {
+    list: CentroidList,
+    centre: UnitVector<Icrs>,
+    fov_rad: f64,
+    /// Stars of the catalogue in it.
+    stars: usize,
+}
+
+/// Draws a frame: its stars with errors, a few of them missing, and as many false detections.
+fn field(patch: &Patch, fov_deg: f64, random: &mut ChaCha8Rng) -> Field {
+    const ERROR_PX: f64 = 0.15;
+    const ERROR_MAG: f64 = 0.15;
+    const DETECTED: usize = 60;
+    let [width, height] = SIZE;
+    let fov_rad = fov_deg * RAD_PER_DEG;
+    let centre = near(&patch.centre, 2.0 * RAD_PER_DEG, random);
+    let focal_px = f64::from(width) / 2.0 / (fov_rad / 2.0).tan();
+    let [width_px, height_px] = SIZE.map(f64::from);
+    let camera = CameraModel::pinhole(width_px, height_px, focal_px, random.random());
+    let attitude = Rotation::looking_at(&centre, TAU * random.random::<f64>());
+    let (place, magnitude) = (
+        Normal::new(0.0, ERROR_PX).unwrap(),
+        Normal::new(0.0, ERROR_MAG).unwrap(),
+    );
+    let mut stars = 0;
+    let mut centroids = Vec::new();
+    for star in &patch.stars {
+        let pixel = camera.pixel_of(&attitude.apply(&star.direction));
+        let Some(mut pixel) = pixel.filter(|pixel| camera.contains(pixel)) else {
+            continue;
+        };
+        stars += 1;
+        if centroids.len() < DETECTED && random.random::<f64>() > 0.1 {
+            pixel.x = (pixel.x + place.sample(random)).clamp(0.0, width_px - 1.0);
+            pixel.y = (pixel.y + place.sample(random)).clamp(0.0, height_px - 1.0);
+            let mag = star.v_mag + magnitude.sample(random);
+            centroids.push(ListedCentroid::new(pixel, mag - 20.0));
+        }
+    }
+    for _ in 0..centroids.len() / 8 {
+        let mut false_one = centroids[random.random_range(0..centroids.len())];
+        false_one.position.x = random.random_range(0.0..width_px - 1.0);
+        false_one.position.y = random.random_range(0.0..height_px - 1.0);
+        centroids.push(false_one);
+    }
+    Field {
+        list: CentroidList {
+            width: Some(width as usize),
+            height: Some(height as usize),
+            photometry: Photometry::Instrumental,
+            has_brightness: true,
+            centroids,
+        },
+        centre,
+        fov_rad,
+        stars,
+    }
+}
+
+/// Whether a field is identified, with a direction that a mount states; never wrongly.
+fn is_identified(
+    field: &Field,
+    deep: &DeepSky,
+    stated: UnitVector<Icrs>,
+    scale_error: f64,
+) -> bool {
+    let scale = Scale::FieldOfView(field.fov_rad * (1.0 + scale_error));
+    let mut context = Context::new(sky());
+    context.deep = Some(deep);
+    context.priors = Priors {
+        scale: Some(ScalePrior::by_user(scale, 0.1)),
+        mount: Some(SkyRegion {
+            centre: stated,
+            radius_rad: 2.0 * RAD_PER_DEG,
+        }),
+        ..Priors::default()
+    };
+    let solution = solve_centroids(&field.list, &context, &mut Workspace::new()).unwrap();
+    let Some(found) = solution.outcome.identification() else {
+        return false;
+    };
+    let off_rad = found.icrs_to_camera.boresight().angle_to(&field.centre);
+    assert!(off_rad < 0.01 * field.fov_rad, "wrong: {off_rad}");
+    assert!(solution.catalog(sky().catalog()).stars().len() > 10);
+    true
+}
+
+fn assert_fields(path: &Path, patch: &Patch) {
+    let deep = DeepSky::new(DeepCatalog::find(path).unwrap(), None);
+    let mut random = ChaCha8Rng::seed_from_u64(68);
+    let mut identified = 0;
+    for number in 0..FIELDS {
+        let fov_deg = [0.2, 0.25, 0.3, 0.4, 0.5][number % 5];
+        let field = field(patch, fov_deg, &mut random);
+        assert!(field.stars > 10);
+        let stated = near(&field.centre, 2.0 * RAD_PER_DEG, &mut random);
+        let scale_error = random.random_range(-0.09..0.09);
+        identified += usize::from(is_identified(&field, &deep, stated, scale_error));
+        if number % 5 == 0 {
+            let elsewhere = near(&patch.centre, 0.3, &mut random);
+            is_identified(&field, &deep, elsewhere, scale_error);
+        }
+    }
+    assert!(deep.take_errors().is_empty());
+    assert!(identified + 1 >= FIELDS, "{identified} of {FIELDS}");
+}
+
+#[test]
+fn fields_of_a_fifth_to_half_a_degree_are_identified_with_each_kind_of_catalogue() {
+    let patch = Patch::draw([83.0, 22.0], 5.5, 1500.0, 68);
+    let folder = tempfile::tempdir().unwrap();
+    for (name, series) in [
+        ("gaia", Series::Gaia),
+        ("tycho", Series::Tycho),
+        ("lite", Series::Lite),
+    ] {
+        let path = folder.path().join(format!("index-{name}.fits"));
+        fs::write(&path, index_file(&patch.stars, series, false)).unwrap();
+        assert_fields(&path, &patch);
+    }
+    for (name, coarse, colored) in [("d80", false, false), ("v05", true, true)] {
+        let database = folder.path().join(name);
+        fs::create_dir(&database).unwrap();
+        areas::write(&database, name, &patch.stars, coarse, colored);
+        assert_fields(&database, &patch);
+    }
+}

@@ -1,0 +1,8 @@
+//! Deep catalogues of other programs: what is read of them, and fields that are identified with them.
+
+mod areas;
+mod damage;
+mod fields;
+mod index_file;
+mod patch;
+mod reading;
