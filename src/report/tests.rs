@@ -197,6 +197,17 @@ fn annotation() -> AnnotationReport {
     }
 }
 
+fn match_report() -> MatchReport {
+    MatchReport {
+        detected: 3,
+        matched: 2,
+        rms_px: 0.0712,
+        rms_arcsec: 5.06,
+        log10_false_alarm: -65.21,
+        catalog: None,
+    }
+}
+
 fn identified() -> FrameReport {
     FrameReport {
         date: Some(date()),
@@ -251,14 +262,7 @@ fn identified() -> FrameReport {
             covariance_arcsec2: [[9.929, 0.5, -1.25], [0.5, 5.499, 2.0], [-1.25, 2.0, 992.9]],
         }),
         optics: Some(optics()),
-        matched: Some(MatchReport {
-            detected: 3,
-            matched: 2,
-            rms_px: 0.0712,
-            rms_arcsec: 5.06,
-            log10_false_alarm: -65.21,
-            catalog: None,
-        }),
+        matched: Some(match_report()),
         magnitude: Some(MagnitudeReport {
             faintest_vmag: 7.321,
             faintest_id: "SKYMAP 05350123".into(),

@@ -83,21 +83,16 @@ pub fn solve_centroids(
     let priors = &priors_of(frame.size, context);
     let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
     let interrupt = workspace.of_frame.clone();
+    let mut search = ListSearch {
+        list: &list,
+        sources: &sources,
+        size: frame.size,
+        workspace,
+        clock: &mut clock,
+    };
     let known = (context, priors);
-    let (answer, deep) = identify_in_all(known, frame.size, &interrupt, |context, priors| {
-        let mut identify = |places| {
-            let field = list.star_field_in(frame.size, places);
-            let workspace = &mut workspace.identify;
-            let (found, _) = search((&field, None), priors, context, workspace, &mut clock);
-            identified(found, None, &field, priors, context.indexed)
-        };
-        let answer = through_air_or_not(priors.places(), &mut identify);
-        let known = (priors, context.utc_offset);
-        let sky = (&sources[..], context.indexed.catalog());
-        settle(answer, known, sky, |places| {
-            through_air_or_not(places, &mut identify)
-        })
-    });
+    let identify = |context: &Context, priors: &Priors| search.identify(context, priors);
+    let (answer, deep) = identify_in_all(known, frame.size, &interrupt, identify);
     let ConfirmedPlaceTime {
         mut outcome,
         priors,
@@ -116,20 +111,23 @@ pub fn solve_centroids(
     let observation = observation(&outcome, priors);
     let bodies = find_bodies(&mut outcome, &sources, priors, catalog);
     clock.lap(Stage::Identify);
-    let note = Note::of_observation(observation.as_ref(), priors, &outcome);
-    let note = Note::of_place_time(place_time.as_ref()).chain(note);
-    let notes = left_out.into_iter().map(Note::RowsLeftOut);
     let unknown = (!list.has_brightness).then_some(Note::BrightnessUnknown);
-    let guessed = Note::of_guessed_size(&frame, outcome.identification());
-    let notes = notes.chain(unknown).chain(guessed).chain(note);
-    let notes = notes
+    let found = outcome.identification();
+    let notes = left_out
+        .into_iter()
+        .map(Note::RowsLeftOut)
+        .chain(unknown)
+        .chain(Note::of_guessed_size(&frame, found))
+        .chain(Note::of_place_time(place_time.as_ref()))
+        .chain(Note::of_observation(observation.as_ref(), priors, &outcome))
         .chain(second_images.double.map(Note::DoubleImage))
-        .chain(second_images.repeated.map(Note::RepeatedSky));
-    let notes = notes.chain(Note::of_bodies(&bodies, &outcome, catalog));
-    let notes = notes.chain(Note::of_residuals(outcome.identification()));
-    let notes = notes.chain(Note::of_pointing(context.attitude_only, &outcome));
-    let notes = notes.chain(Note::of_lens(context.lens.as_deref(), &outcome));
-    let notes = notes.chain(Note::of_date(priors, &outcome)).collect();
+        .chain(second_images.repeated.map(Note::RepeatedSky))
+        .chain(Note::of_bodies(&bodies, &outcome, catalog))
+        .chain(Note::of_residuals(found))
+        .chain(Note::of_pointing(context.attitude_only, &outcome))
+        .chain(Note::of_lens(context.lens.as_deref(), &outcome))
+        .chain(Note::of_date(priors, &outcome))
+        .collect();
     Ok(Solution {
         width,
         height,
@@ -157,6 +155,32 @@ pub fn solve_centroids(
         calibration: None,
         timing: clock.timing(),
     })
+}
+
+/// The search for the stars of a list.
+struct ListSearch<'a, 'c> {
+    list: &'a CentroidList,
+    sources: &'a [Source],
+    size: Size,
+    workspace: &'a mut Workspace,
+    clock: &'a mut Stopwatch<'c>,
+}
+
+impl ListSearch<'_, '_> {
+    fn identify(&mut self, context: &Context, priors: &Priors) -> ConfirmedPlaceTime {
+        let mut identify = |places| {
+            let field = self.list.star_field_in(self.size, places);
+            let workspace = &mut self.workspace.identify;
+            let (found, _) = search((&field, None), priors, context, workspace, self.clock);
+            identified(found, None, &field, priors, context.indexed)
+        };
+        let answer = through_air_or_not(priors.places(), &mut identify);
+        let known = (priors, context.utc_offset);
+        let sky = (self.sources, context.indexed.catalog());
+        settle(answer, known, sky, |places| {
+            through_air_or_not(places, &mut identify)
+        })
+    }
 }
 
 impl Answered for ConfirmedPlaceTime {

@@ -209,28 +209,16 @@ fn solve(
         context,
         workspace,
     };
-    let Some(mut stars) = stage.find(&config, &mut clock)? else {
+    let Some((found, more_stars)) = stage.find(&config, &mut clock)? else {
         let timing = clock.timing();
         return Ok(not_in_time(raw, calibration, &priors, context, timing));
     };
-    let mut more_stars = None;
-    if stars.may_lack_stars(&config) {
-        let all = DetectConfig {
-            max_detections: DetectConfig::DEFAULT_MAX_DETECTIONS,
-            ..config.clone()
-        };
-        let more = stage.run(&all, &mut clock)?;
-        if let Some(more) = more.filter(FoundStars::are_identified) {
-            stars = more;
-            more_stars = Some(config.max_detections);
-        }
-    }
     let FoundStars {
         detections,
         mosaic,
         stars,
         deep,
-    } = stars;
+    } = found;
     let IdentifiedStars {
         mut outcome,
         dropped_scale,
@@ -444,9 +432,32 @@ impl StarSearch<'_, '_> {
         })
     }
 
+    /// The stars that are wanted, and how many of them were, where more were needed to identify them; `None` if
+    /// detection was not done in time.
+    fn find(
+        &mut self,
+        config: &DetectConfig,
+        clock: &mut Stopwatch,
+    ) -> Result<Option<(FoundStars, Option<usize>)>, DetectError> {
+        let Some(found) = self.find_wanted(config, clock)? else {
+            return Ok(None);
+        };
+        if found.may_lack_stars(config) {
+            let all = DetectConfig {
+                max_detections: DetectConfig::DEFAULT_MAX_DETECTIONS,
+                ..config.clone()
+            };
+            let more = self.run(&all, clock)?;
+            if let Some(more) = more.filter(FoundStars::are_identified) {
+                return Ok(Some((more, Some(config.max_detections))));
+            }
+        }
+        Ok(Some((found, None)))
+    }
+
     /// The stars that are wanted: of the pointing alone, the brightest, if these show it; `None` if detection was
     /// not done in time.
-    fn find(
+    fn find_wanted(
         &mut self,
         config: &DetectConfig,
         clock: &mut Stopwatch,

@@ -19,13 +19,16 @@ const RECORDS_AT_ONCE: u64 = 1 << 15;
 /// area: they are not spread evenly in it.
 const LOOKED_AT: f64 = 6.0;
 
+/// The file of each area.
+type AreaFiles = BTreeMap<Area, PathBuf>;
+
 /// A database of areas.
 #[derive(Debug)]
 pub struct AreaDatabase {
     /// Its name, as in `d50`.
     pub name: String,
     tiling: Tiling,
-    files: BTreeMap<Area, PathBuf>,
+    files: AreaFiles,
     header: AstapHeader,
 }
 
@@ -47,16 +50,14 @@ fn parsed(path: &Path) -> Option<(String, Tiling, Area)> {
 impl AreaDatabase {
     /// The databases of which `files` are, by name. Files with other names are left out.
     pub fn find(files: &[PathBuf]) -> Result<Vec<Self>, (PathBuf, Damage)> {
-        let mut found: BTreeMap<(String, &str), (Tiling, BTreeMap<Area, PathBuf>)> =
-            BTreeMap::new();
+        let mut found: BTreeMap<(String, Tiling), AreaFiles> = BTreeMap::new();
         for path in files {
             if let Some((name, tiling, area)) = parsed(path) {
-                let of_name = found.entry((name, tiling.extension()));
-                let (_, files) = of_name.or_insert_with(|| (tiling, BTreeMap::new()));
+                let files = found.entry((name, tiling)).or_default();
                 files.insert(area, path.clone());
             }
         }
-        let open = |((name, _), (tiling, files)): (_, (Tiling, BTreeMap<Area, PathBuf>))| {
+        let open = |((name, tiling), files): (_, AreaFiles)| {
             let first = files.values().next().cloned().unwrap_or_default();
             let header = open(&first).map_err(|error| (first, error))?.1;
             Ok(Self {

@@ -13,7 +13,7 @@ const OF_1476: [u32; 18] = [
 const MARGIN_DEG: f64 = 0.001;
 
 /// A division of the sky.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Tiling {
     /// Into 290 areas, all of one size but the caps at the poles.
     Areas290,
@@ -37,14 +37,6 @@ impl Tiling {
             "290" => Some(Self::Areas290),
             "1476" => Some(Self::Areas1476),
             _ => None,
-        }
-    }
-
-    /// The ending of its files.
-    pub const fn extension(self) -> &'static str {
-        match self {
-            Self::Areas290 => "290",
-            Self::Areas1476 => "1476",
         }
     }
 
