@@ -346,11 +346,14 @@ mod tests {
             for number in [0, 1, cells.zones / 3, cells.zones / 2, cells.zones - 1] {
                 let zone = cells.zone(number);
                 let found = class.brightest_around(&zone, &by_zone[number]);
-                assert_eq!(found.len(), zone.cells);
-                for around in found {
-                    assert_eq!(around.centre, zone.centre(around.cell));
-                    assert_eq!(around.stars[..], brightest_around(&class, &around.centre));
+                let mut found = found.into_iter().peekable();
+                for cell in 0..zone.cells {
+                    let around = found.next_if(|around| around.cell == cell);
+                    let stars = around.map(|around| around.stars).unwrap_or_default();
+                    let expected = brightest_around(&class, &zone.centre(cell));
+                    assert_eq!(stars[..], expected);
                 }
+                assert!(found.next().is_none());
             }
         }
     }

@@ -7,7 +7,9 @@ use crate::base::size::Size;
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::deep::Region;
 use crate::identify::diagnosis::Diagnosis;
-use crate::identify::{Identification, Priors, ScalePrior, SearchFailure, SkyRegion};
+use crate::identify::{
+    Identification, LOG10_FALSE_ALARM_LIMIT, Priors, ScalePrior, SearchFailure, SkyRegion,
+};
 use crate::solve::context::Context;
 use crate::solve::outcome::{Outcome, Reason};
 
@@ -68,6 +70,8 @@ impl DeepSearch<'_> {
         &self,
         identify: &mut impl FnMut(&Context, &Priors) -> T,
     ) -> Option<(T, Indexed)> {
+        // The catalogue of all frames, first or later.
+        let mut searches = 1.0;
         for number in 0..self.deep.catalogs().len() {
             for attempt in attempts(self.priors, self.size, self.deep.narrowest_rad(number)) {
                 if self.interrupt.is_due() {
@@ -80,8 +84,12 @@ impl DeepSearch<'_> {
                     near: attempt.near,
                     ..*self.priors
                 };
-                let found = identify(&self.context.over(&indexed), &priors);
-                if let Some(first) = found.outcome().identification() {
+                let mut found = identify(&self.context.over(&indexed), &priors);
+                searches += 1.0;
+                if let Outcome::Identified(first) = found.outcome_mut()
+                    && is_sure_after(first, searches)
+                {
+                    let first = &*first;
                     let named = self.named(number, first, identify);
                     return Some(named.unwrap_or((found, indexed)));
                 }
@@ -153,6 +161,12 @@ impl DeepSearch<'_> {
         second.log10_false_alarm = second.log10_false_alarm.max(first.log10_false_alarm);
         Some((again, indexed))
     }
+}
+
+/// Whether an answer is still sure after so many searches: each gives chance as much opportunity as the first.
+fn is_sure_after(found: &mut Identification, searches: f64) -> bool {
+    found.log10_false_alarm += libm::log10(searches);
+    found.log10_false_alarm <= LOG10_FALSE_ALARM_LIMIT
 }
 
 /// The part of the sky around an answer, with as many stars as detections can be.

@@ -6,7 +6,7 @@ use crate::base::interrupt::Interrupt;
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::deep::{DeepCatalog, DeepContents, Region};
 use crate::catalog::{Catalog, CatalogError};
-use crate::identify::{IndexedCatalog, SearchedPart};
+use crate::identify::{IndexedCatalog, MIN_STARS, SearchedPart};
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -141,6 +141,9 @@ impl DeepSky {
                     fov_range_rad: attempt.fov_range_rad,
                 };
                 let catalog = Arc::new(self.kept(catalog)?);
+                if catalog.stars().len() < MIN_STARS {
+                    return None;
+                }
                 IndexedCatalog::of_part(catalog, part, None, &|_| (), interrupt)
                     .ok()
                     .map(Arc::new)
