@@ -49,6 +49,7 @@ mod compact;
 mod contents;
 pub mod deep;
 mod error;
+mod folder;
 mod gaia;
 mod id;
 mod import;

@@ -1,6 +1,5 @@
 //! Identifiers of stars that have only a place.
 
-use super::id::whole_number;
 use crate::base::coords::{Icrs, UnitVector};
 use std::f64::consts::{PI, TAU};
 use std::fmt;
@@ -58,7 +57,10 @@ fn steps(text: &str, decimals: usize) -> Option<u64> {
     if whole.len() != 6 || parts.len() != decimals {
         return None;
     }
-    let number = |text: &str| whole_number(text.as_bytes());
+    let number = |text: &str| {
+        let is_number = text.bytes().all(|digit| digit.is_ascii_digit());
+        is_number.then(|| text.parse::<u64>().ok())?
+    };
     let [large, minutes, seconds] = [&whole[..2], &whole[2..4], &whole[4..]].map(number);
     let seconds = (large? * 60 + minutes?) * 60 + seconds?;
     Some(seconds * 10u64.pow(decimals as u32) + number(parts)?)

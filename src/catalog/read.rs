@@ -1,6 +1,7 @@
 //! Reads a catalogue, a file or a directory, whose kind is detected from its content.
 
 use super::deep::{DeepCatalog, Region};
+use super::folder::files_in;
 use super::import::{
     CatalogPart, ImportRows, ImportSummary, ImportTally, LoadedCatalog, MAX_RECORDS, OpenedFile,
     RowParser, SourceFile, combine,
@@ -12,7 +13,6 @@ use super::{Catalog, CatalogError, compact};
 use crate::base::interrupt::Interrupt;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 impl Catalog {
     /// Reads the catalogue in the file or directory `path`, whose [kind](super#kinds) is detected
@@ -231,22 +231,6 @@ fn read_directory(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, C
     });
     reading.files.extend(left_out);
     Ok(reading)
-}
-
-/// The files in a directory that are not hidden, by name.
-pub(super) fn files_in(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
-    let list = || -> io::Result<Vec<PathBuf>> {
-        let paths = fs::read_dir(path)?.map(|entry| Ok(entry?.path()));
-        let mut files = paths.collect::<io::Result<Vec<PathBuf>>>()?;
-        let is_hidden = |file: &Path| {
-            let name = file.file_name();
-            name.is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
-        };
-        files.retain(|file| file.is_file() && !is_hidden(file));
-        files.sort();
-        Ok(files)
-    };
-    list().map_err(CatalogError::open(path))
 }
 
 /// Describes a directory without exactly one catalogue.

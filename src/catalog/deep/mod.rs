@@ -21,6 +21,7 @@ pub use error::Damage;
 pub use installed::installed_paths;
 pub use region::Region;
 
+use super::folder::files_in;
 use super::{Catalog, CatalogError, Star};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
@@ -122,7 +123,7 @@ impl DeepCatalog {
     pub fn find_installed(path: &Path) -> Result<Vec<Self>, CatalogError> {
         let (mut indexes, mut found) = (Vec::new(), Vec::new());
         let (files, beside) = if path.is_dir() {
-            let files = super::read::files_in(path)?;
+            let files = files_in(path)?;
             (files.clone(), files)
         } else {
             (vec![path.to_owned()], siblings(path)?)
@@ -314,7 +315,7 @@ fn siblings(path: &Path) -> Result<Vec<PathBuf>, CatalogError> {
         true => Path::new("."),
         false => directory,
     };
-    let mut files = super::read::files_in(directory)?;
+    let mut files = files_in(directory)?;
     files.retain(|file| file.extension() == ending && name(file) == name(path));
     Ok(files)
 }

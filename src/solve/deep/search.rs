@@ -48,11 +48,24 @@ pub fn identify_in_all<T: Answered>(
     if found.outcome().identification().is_some() {
         return (found, None);
     }
-    if !is_narrow && let Some((found, named)) = frame.search(&mut identify) {
+    if !is_narrow
+        && may_be_narrow(found.outcome())
+        && let Some((found, named)) = frame.search(&mut identify)
+    {
         return (found, Some(named));
     }
     frame.explain(found.outcome_mut());
     (found, None)
+}
+
+/// Whether a frame that is not identified may be of a narrow field: it has stars, and time is left.
+fn may_be_narrow(outcome: &Outcome) -> bool {
+    !matches!(
+        outcome,
+        Outcome::NotIdentified(Reason::Search(
+            SearchFailure::TooFewStars { .. } | SearchFailure::Interrupted
+        ))
+    )
 }
 
 /// The search of a frame in deep catalogues.
