@@ -39,6 +39,9 @@ def night_frame(number):
 
 # Definition in the schema, and the command; OUT is a directory. Later commands read what earlier ones
 # wrote. None: only what is written matters.
+# Fields of frames for which the repository has no catalog: tests/it/deep draws its own.
+UNSEEN = {"process.match.catalog"}
+
 COMMANDS = f"""
 simulate: simulate --camera {CAMERA} --site 47,8,500 --date 2026-01-15T20:00Z --ra 62.8 --dec 46.9 --first 0 --out OUT/night
 simulate: simulate --camera {CAMERA} --site 47,8,500 --date 2026-01-15T20:30Z --ra 70.3 --dec 46.9 --first 1 --out OUT/night
@@ -189,7 +192,7 @@ def main():
                 for error in validator.iter_errors(found):
                     faults.append(f"{line}: {error.json_path}: {error.message[:200]}")
     known = {path for name, schema in SCHEMA["$defs"].items() for path in fields(schema, name)}
-    faults += [f"no object has the schema's field {path}" for path in sorted(known - seen)]
+    faults += [f"no object has the schema's field {path}" for path in sorted(known - seen - UNSEEN)]
     faults += check_documentation({path.rsplit(".", 1)[1] for path in known})
     print(*faults[:40], f"{count} objects checked, {len(faults)} faults", sep="\n")
     sys.exit(1 if faults else 0)
