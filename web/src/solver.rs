@@ -18,6 +18,7 @@ const PREVIEW_PX: usize = 1000;
 /// A catalog with its index, and buffers.
 #[wasm_bindgen]
 pub struct Solver {
+    catalog: &'static Catalog,
     indexed: IndexedCatalog<'static>,
     is_built: bool,
     /// Whether its answers are provisional.
@@ -39,6 +40,7 @@ impl Solver {
         let is_built = kept.is_none();
         let build = || IndexedCatalog::build(catalog, &|share| progress("index", share));
         Ok(Self {
+            catalog,
             indexed: kept.unwrap_or_else(build),
             is_built,
             is_provisional: false,
@@ -49,8 +51,10 @@ impl Solver {
     /// The stars to V = 6.5 with their index, which is built in a fraction of a second: for a provisional
     /// answer, of the pointing alone.
     pub fn of_bright_stars() -> Self {
+        let catalog = catalogs::bright();
         Self {
-            indexed: IndexedCatalog::build(catalogs::bright(), &|_| ()),
+            catalog,
+            indexed: IndexedCatalog::build(catalog, &|_| ()),
             is_built: true,
             is_provisional: true,
             workspace: Workspace::new(),
@@ -88,10 +92,9 @@ impl Solver {
         };
         let solved = solve::solve_read(path, read, &context, &mut self.workspace);
         let (solution, frame) = solved.map_err(told)?;
-        let catalog = self.indexed.catalog();
-        let report = FrameReport::new(name, &solution, catalog);
+        let report = FrameReport::new(name, &solution, self.catalog);
         Ok(Solved {
-            catalog,
+            catalog: self.catalog,
             bytes,
             frame,
             solution,

@@ -3,7 +3,7 @@
 use super::areas;
 use super::index_file::{Series, index_file};
 use super::patch::{Patch, near};
-use crate::common::sky;
+use crate::common::{Ran, sky, starpipe};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
@@ -129,6 +129,45 @@ fn assert_fields(path: &Path, patch: &Patch) {
     }
     assert!(deep.take_errors().is_empty());
     assert!(identified + 1 >= FIELDS, "{identified} of {FIELDS}");
+}
+
+/// The program names the catalogue that it used, and says how many stars it expects where there are too few.
+#[test]
+fn the_report_names_the_catalogue_that_was_used() {
+    let patch = Patch::draw([200.0, -40.0], 3.0, 900.0, 7);
+    let folder = tempfile::tempdir().unwrap();
+    let index = folder.path().join("index.fits");
+    fs::write(&index, index_file(&patch.stars, Series::Gaia, false)).unwrap();
+    let field = field(&patch, 0.4, &mut ChaCha8Rng::seed_from_u64(7));
+    let rows = field.list.centroids.iter().map(|centroid| {
+        let place = centroid.position;
+        format!("{},{},{}\n", place.x, place.y, centroid.mag)
+    });
+    let list = folder.path().join("list.csv");
+    fs::write(&list, format!("x,y,mag\n{}", rows.collect::<String>())).unwrap();
+    let mut identify = starpipe();
+    let [width, height] = SIZE.map(|side| side.to_string());
+    identify.args([
+        "identify", "--format", "json", "--fov", "0.4", "--width", &width,
+    ]);
+    let (ra_rad, dec_rad) = patch.centre.to_ra_dec();
+    let near = format!("{},{}", ra_rad / RAD_PER_DEG, dec_rad / RAD_PER_DEG);
+    identify.args(["--height", &height, "--near", &near, "--radius", "3"]);
+    let ran = Ran::new(identify.arg(&list));
+    assert!(
+        ran.stdout
+            .contains("too narrow for the catalog: 1 star is expected"),
+        "{}",
+        ran.stdout
+    );
+    let ran = Ran::new(identify.arg("--catalog").arg(&index));
+    assert_eq!(ran.status, 0, "{}", ran.stdout);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let catalog = report["match"]["catalog"].as_str().unwrap();
+    assert!(
+        catalog.contains("astrometry.net") && catalog.contains("SKY2000"),
+        "{catalog}"
+    );
 }
 
 #[test]
