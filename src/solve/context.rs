@@ -139,7 +139,9 @@ impl<'a> Context<'a> {
                 .or(lens.map(ScalePrior::of_lens))
                 .or(camera_scale.map(ScalePrior::of_camera))
                 .or(header_scale),
-            mount: header.pointing_deg.map(SkyRegion::of_mount),
+            mount: priors
+                .mount
+                .or(header.pointing_deg.map(SkyRegion::of_mount)),
             site: priors.site.or(header.site),
             exposure_s: priors.exposure_s.or(header.exposure_s),
             ..priors

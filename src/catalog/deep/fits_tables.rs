@@ -5,6 +5,7 @@
 
 use super::error::Damage;
 use crate::base::file_ranges::FileRanges;
+use crate::base::fits_types::element_bytes;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -234,15 +235,10 @@ fn cell_of(form: &str) -> Option<(u8, usize)> {
     };
     let code = *form.as_bytes().get(digits)?;
     let bytes = match code {
-        b'X' => return Some((code, repeat.div_ceil(8))),
-        b'L' | b'B' | b'A' => 1,
-        b'I' => 2,
-        b'J' | b'E' => 4,
-        b'K' | b'D' | b'C' | b'P' => 8,
-        b'M' | b'Q' => 16,
-        _ => return None,
+        b'X' => repeat.div_ceil(8),
+        _ => repeat.checked_mul(element_bytes(code)?)?,
     };
-    Some((code, repeat.checked_mul(bytes)?))
+    Some((code, bytes))
 }
 
 impl Column {

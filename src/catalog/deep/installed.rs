@@ -1,5 +1,6 @@
 //! Where catalogues are installed: by other programs, and by the user for this one.
 
+use crate::base::user_folders;
 use std::env;
 use std::path::PathBuf;
 
@@ -25,27 +26,10 @@ pub fn installed_paths() -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = match named {
         Some(named) => env::split_paths(&named).collect(),
         None => {
-            let own = user_data_folder().map(|folder| folder.join("starpipe").join("catalogs"));
+            let own = user_folders::data().map(|folder| folder.join("starpipe").join("catalogs"));
             own.into_iter().chain(FOLDERS.map(PathBuf::from)).collect()
         }
     };
     paths.retain(|path| !path.as_os_str().is_empty() && path.exists());
     paths
-}
-
-fn user_data_folder() -> Option<PathBuf> {
-    let variable = |name: &str| {
-        let path = PathBuf::from(env::var_os(name)?);
-        // The XDG specification wants relative paths ignored.
-        path.is_absolute().then_some(path)
-    };
-    variable("XDG_DATA_HOME").or_else(|| {
-        if cfg!(windows) {
-            variable("LOCALAPPDATA")
-        } else if cfg!(target_os = "macos") {
-            variable("HOME").map(|home| home.join("Library/Application Support"))
-        } else {
-            variable("HOME").map(|home| home.join(".local/share"))
-        }
-    })
 }

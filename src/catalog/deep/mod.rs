@@ -25,6 +25,7 @@ use super::folder::files_in;
 use super::{Catalog, CatalogError, Star};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
+use crate::base::units::WHOLE_SKY_SQ_DEG;
 use astap::{AreaDatabase, WideDatabase};
 use astrometry::IndexFile;
 use region::BrightestStars;
@@ -33,8 +34,6 @@ use std::time::UNIX_EPOCH;
 use stored::StoredCatalog;
 use xxhash_rust::xxh3::Xxh3;
 
-/// Area of the whole sky.
-const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 /// Bytes of a file by which its kind is told: header cards of some generators come after a long history.
 const HEAD_BYTES: u64 = 2880;
 

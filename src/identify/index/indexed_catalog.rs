@@ -7,7 +7,7 @@ use super::packed_vectors::PackedVectors;
 use super::table::{CHUNKS, Triangle, TriangleRange};
 use super::triangle_index::TriangleIndex;
 use crate::base::interrupt::{Interrupt, Interrupted};
-use crate::base::units::RAD_PER_DEG;
+use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
 use crate::catalog::sky_grid::SkyGrid;
 use crate::catalog::{Catalog, Star};
 use std::path::Path;
@@ -16,8 +16,6 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Wider lenses are no pinholes any more.
 const WIDEST_FOV_DEG: f64 = 80.0;
-/// Area of the whole sky.
-const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 
 /// A catalog with the index that identification searches.
 ///

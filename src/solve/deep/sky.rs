@@ -3,7 +3,7 @@
 use super::around::merged;
 use super::plan::{Attempt, FIELDS_OF_SKY_RAD, MAX_STARS};
 use crate::base::interrupt::Interrupt;
-use crate::base::units::RAD_PER_DEG;
+use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
 use crate::catalog::deep::{DeepCatalog, DeepContents, Region};
 use crate::catalog::{Catalog, CatalogError};
 use crate::identify::{IndexedCatalog, MIN_STARS, SearchedPart};
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Density of the stars of the whole sky that are indexed, where there are as many.
-const PER_SQ_DEG_OF_SKY: f64 = MAX_STARS / 41_252.96;
+const PER_SQ_DEG_OF_SKY: f64 = MAX_STARS / WHOLE_SKY_SQ_DEG;
 
 /// Version of the stars in the cache: it changes with what is read of catalogues, and with how stars are chosen.
 const STARS_VERSION: u32 = 1;

@@ -5,7 +5,7 @@ use super::tiling::{Area, Tiling};
 use crate::base::coords::UnitVector;
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
-use crate::base::units::RAD_PER_DEG;
+use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
 use crate::catalog::deep::error::Damage;
 use crate::catalog::deep::region::Region;
 use crate::catalog::star::rounded_mag;
@@ -91,7 +91,6 @@ impl AreaDatabase {
 
     /// The share of the sky whose files there are.
     pub fn share_of_sky(&self) -> f64 {
-        const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
         let areas = self.files.keys();
         let areas = areas.map(|area| self.tiling.area_sq_deg(area.ring));
         (areas.sum::<f64>() / WHOLE_SKY_SQ_DEG).min(1.0)

@@ -5,7 +5,7 @@ use super::tree::{DATA, HEADER, StarTree};
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
-use crate::base::units::RAD_PER_DEG;
+use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
 use crate::catalog::deep::error::Damage;
 use crate::catalog::deep::fits_tables::{Column, FitsTable, Rows, read_tables};
 use crate::catalog::deep::healpix::{HealpixCell, samples};
@@ -260,9 +260,6 @@ impl<'a> Details<'a> {
         }
     }
 }
-
-/// Area of the whole sky.
-const WHOLE_SKY_SQ_DEG: f64 = 41_252.96;
 
 /// The motion in a row, in mas a year; `None` where it is not known.
 fn motion_of([ra, dec]: [&Column; 2], row: &[u8]) -> Option<[f32; 2]> {

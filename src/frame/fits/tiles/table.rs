@@ -4,6 +4,7 @@
 //! FITS Standard 4.0 (2018), sect. 7.3.
 
 use super::error::TileError;
+use crate::base::fits_types::element_bytes;
 use crate::frame::FrameError;
 use crate::frame::fits::error::{malformed, truncated};
 use crate::frame::fits::header::UnitHeader;
@@ -96,7 +97,7 @@ impl<'a> TileTable<'a> {
         if count == 0 {
             return Ok(&[]);
         }
-        let width = column.element.and_then(width_of).unwrap_or(1);
+        let width = column.element.and_then(element_bytes).unwrap_or(1);
         let start = u128::from(offset);
         let end = start + u128::from(count) * width as u128;
         let heap = self.heap.len();
@@ -152,20 +153,8 @@ impl TileColumn {
 
     /// Size of the elements in the heap, in bytes.
     pub fn element_bytes(self) -> Option<usize> {
-        self.element.and_then(width_of)
+        self.element.and_then(element_bytes)
     }
-}
-
-/// Size of an element of type `kind`, in bytes.
-fn width_of(kind: u8) -> Option<usize> {
-    Some(match kind {
-        b'L' | b'B' | b'A' => 1,
-        b'I' => 2,
-        b'J' | b'E' => 4,
-        b'K' | b'D' | b'C' | b'P' => 8,
-        b'M' | b'Q' => 16,
-        _ => return None,
-    })
 }
 
 /// The columns that hold something, with their names.
@@ -205,11 +194,11 @@ fn column(form: &str, offset: usize) -> Option<(TileColumn, usize)> {
     let kind = letters.next()?;
     let bytes = match kind {
         b'X' => repeat.div_ceil(8),
-        _ => repeat.checked_mul(width_of(kind)?)?,
+        _ => repeat.checked_mul(element_bytes(kind)?)?,
     };
     let is_descriptor = matches!(kind, b'P' | b'Q');
     let element = if is_descriptor { letters.next() } else { None };
-    if is_descriptor && element.and_then(width_of).is_none() {
+    if is_descriptor && element.and_then(element_bytes).is_none() {
         return None;
     }
     let column = TileColumn {
