@@ -2,6 +2,8 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 use web_time::Instant;
 
 /// Tells long work whether to end. It is asked every few milliseconds, from any thread.
@@ -41,6 +43,12 @@ impl Interrupt {
         Self::when(move || this.is_due() || Instant::now() >= deadline)
     }
 
+    /// Ends the work at `deadline`, too, and later by what `paused` has.
+    pub(crate) fn or_after(&self, deadline: Instant, paused: &Paused) -> Self {
+        let (this, paused) = (self.clone(), paused.clone());
+        Self::when(move || this.is_due() || Instant::now() >= deadline + paused.total())
+    }
+
     /// Whether to end now.
     pub fn is_due(&self) -> bool {
         self.0.as_ref().is_some_and(|is_due| is_due())
@@ -56,6 +64,25 @@ impl Interrupt {
         } else {
             Ok(())
         }
+    }
+}
+
+/// Time that does not count for a deadline: what is done once for all frames.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Paused(Arc<AtomicU64>);
+
+impl Paused {
+    /// Does work that does not count.
+    pub(crate) fn during<T>(&self, work: impl FnOnce() -> T) -> T {
+        let begun = Instant::now();
+        let done = work();
+        let spent_ms = u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
+        self.0.fetch_add(spent_ms, Ordering::Relaxed);
+        done
+    }
+
+    fn total(&self) -> Duration {
+        Duration::from_millis(self.0.load(Ordering::Relaxed))
     }
 }
 

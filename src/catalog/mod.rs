@@ -56,6 +56,7 @@ mod import;
 mod numbers;
 #[cfg(feature = "overlay")]
 pub(crate) mod objects;
+mod parts;
 mod place_id;
 mod position;
 mod proper_names;

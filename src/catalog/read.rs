@@ -3,13 +3,13 @@
 use super::deep::{DeepCatalog, Region};
 use super::folder::files_in;
 use super::import::{
-    CatalogPart, ImportRows, ImportSummary, ImportTally, LoadedCatalog, MAX_RECORDS, OpenedFile,
-    RowParser, SourceFile, combine,
+    CatalogPart, ImportRows, ImportSummary, LoadedCatalog, MAX_RECORDS, OpenedFile, RowParser,
+    SourceFile, combine,
 };
-use super::sky2000::FixedWidth;
+use super::parts::{CatalogFileKind, read_part, title};
 use super::table::CatalogTable;
 use super::tycho2::Tycho2;
-use super::{Catalog, CatalogError, compact};
+use super::{Catalog, CatalogError};
 use crate::base::interrupt::Interrupt;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -76,7 +76,7 @@ pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, C
 /// no records.
 pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
     let deep = DeepCatalog::find(path)?;
-    if let Some(deep) = deep.first() {
+    if let Some(deep) = deep.into_iter().next() {
         return import_deep(deep);
     }
     let reading = read(path)?;
@@ -87,7 +87,11 @@ pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
 }
 
 /// Reads all stars of a catalogue that is otherwise read region by region.
-fn import_deep(deep: &DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
+fn import_deep(deep: DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
+    let deep = match deep.into_loaded() {
+        Ok(loaded) => return Ok(loaded),
+        Err(deep) => deep,
+    };
     let contents = deep.contents();
     if contents.stars > MAX_RECORDS {
         let (path, limit) = (deep.path().to_owned(), MAX_RECORDS);
@@ -108,27 +112,6 @@ fn import_deep(deep: &DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
     Ok(LoadedCatalog { catalog, files })
 }
 
-/// The kind of a file, as far as its first bytes tell.
-enum CatalogFileKind {
-    Compact,
-    Sky2000,
-    Tycho2(Tycho2),
-    /// Or none of them.
-    Table,
-}
-
-impl CatalogFileKind {
-    fn of(head: &[u8]) -> Self {
-        if head.starts_with(&compact::MAGIC) {
-            Self::Compact
-        } else if FixedWidth::is_in(head) {
-            Self::Sky2000
-        } else {
-            Tycho2::detect(head).map_or(Self::Table, Self::Tycho2)
-        }
-    }
-}
-
 fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> {
     let bytes = file.read_to_end(path)?;
     let catalog = Catalog::from_compact(&bytes).map_err(|error| CatalogError::Compact {
@@ -140,25 +123,6 @@ fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> 
         return Err(CatalogError::NoStars { path, records });
     }
     Ok(catalog)
-}
-
-/// Reads the records of a file that is not compact.
-fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError> {
-    let kind = CatalogFileKind::of(&file.head);
-    let mut rows = ImportRows::new(file.reader);
-    let format: Box<dyn RowParser + Send> = match kind {
-        CatalogFileKind::Sky2000 => Box::new(FixedWidth),
-        CatalogFileKind::Tycho2(file) => Box::new(file),
-        CatalogFileKind::Compact | CatalogFileKind::Table => {
-            Box::new(CatalogTable::open(&mut rows, path)?)
-        }
-    };
-    let tally = ImportTally::read(&mut rows, &*format, path)?;
-    Ok(CatalogPart {
-        path: path.to_owned(),
-        format,
-        tally,
-    })
 }
 
 /// The files of a directory by kind.
@@ -248,17 +212,4 @@ fn contents_of(tycho2: &[PathBuf], others: &[PathBuf]) -> String {
         "found more than one catalog in it ({}, ...)",
         names.join(", ")
     )
-}
-
-/// The title of a catalogue, with the file name, which alone tells the version.
-fn title(path: &Path, format: &dyn RowParser) -> String {
-    // `.` has no name of its own.
-    let full = path.canonicalize().unwrap_or_default();
-    let name = path.file_name().or(full.file_name()).unwrap_or_default();
-    let name = name.to_string_lossy();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    match format.catalog() {
-        Some(catalog) => format!("{catalog} ({name})"),
-        None => name.to_owned(),
-    }
 }

@@ -53,7 +53,6 @@ pub(crate) fn identify(arguments: IdentifyArgs) -> Result<CommandOutput, Command
     let plan = SolvingPlan {
         options: stated,
         camera,
-        deep: solving.deep()?,
         ..SolvingPlan::default()
     };
     Ok(report_all(&Inputs::Lists(options), &lists, solving, &plan)?.into())

@@ -5,7 +5,7 @@ use super::fixed_camera::FixedCamera;
 use super::pointing_buffers::PointingBuffers;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
-use crate::base::interrupt::Interrupt;
+use crate::base::interrupt::{Interrupt, Paused};
 use crate::base::size::Size;
 use crate::calibration::Calibration;
 use crate::camera::KnownLens;
@@ -71,6 +71,8 @@ pub struct Context<'a> {
     pub time_limit: Option<Duration>,
     /// Told of each stage that is done; a stage may come again.
     pub on_stage: Option<&'a (dyn Fn(Stage) + Sync)>,
+    /// Whether to search for the reason why a frame is not identified: not where it is tried another way.
+    pub(crate) explains: bool,
 }
 
 impl<'a> Context<'a> {
@@ -97,6 +99,15 @@ impl<'a> Context<'a> {
             as_stored: false,
             time_limit: None,
             on_stage: None,
+            explains: true,
+        }
+    }
+
+    /// The same without a reason where a frame is not identified.
+    pub(super) fn unexplained(&self) -> Self {
+        Self {
+            explains: false,
+            ..self.clone()
         }
     }
 
@@ -105,6 +116,7 @@ impl<'a> Context<'a> {
         Context {
             indexed,
             deep: None,
+            explains: false,
             ..self.clone()
         }
     }
@@ -195,7 +207,18 @@ pub struct Workspace {
     pub(super) pointing: PointingBuffers,
     interrupt: Interrupt,
     /// Also due at the deadline of the frame.
-    pub(super) of_frame: Interrupt,
+    of_frame: Interrupt,
+    paused: Paused,
+}
+
+/// When the work on a frame is to end.
+pub struct FrameLimits {
+    /// When all work is.
+    pub of_all: Interrupt,
+    /// The same, or at the deadline of the frame.
+    pub of_frame: Interrupt,
+    /// Time that does not count for the frame.
+    pub paused: Paused,
 }
 
 impl Workspace {
@@ -250,10 +273,20 @@ impl Workspace {
         empty.with_interrupt(&self.interrupt)
     }
 
+    /// When the work on the frame is to end.
+    pub(super) fn limits(&self) -> FrameLimits {
+        FrameLimits {
+            of_all: self.interrupt.clone(),
+            of_frame: self.of_frame.clone(),
+            paused: self.paused.clone(),
+        }
+    }
+
     /// Ends the work on one frame at `deadline`, too.
     pub(super) fn set_deadline(&mut self, deadline: Option<Instant>) {
+        self.paused = Paused::default();
         let interrupt = match deadline {
-            Some(deadline) => self.interrupt.or_at(deadline),
+            Some(deadline) => self.interrupt.or_after(deadline, &self.paused),
             None => self.interrupt.clone(),
         };
         self.frames.set_interrupt(interrupt.clone());

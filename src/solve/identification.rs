@@ -16,8 +16,8 @@ use crate::identify::diagnosis::{
     find_repeated_sky,
 };
 use crate::identify::{
-    Choices, Identification, IndexedCatalog, LOG10_FALSE_ALARM_LIMIT, ObservedStar, OtherFields,
-    Priors, ScalePrior, SearchFailure, SourceIndex, StarField,
+    Choices, Identification, LOG10_FALSE_ALARM_LIMIT, ObservedStar, OtherFields, Priors,
+    ScalePrior, SearchFailure, SourceIndex, StarField,
 };
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -60,9 +60,9 @@ pub(super) fn identify_stars(
         found.add_common_error(trails.middle_sigma_px);
     }
     let image = Some((frame, detections));
-    let outcome = identified(found, image, &field, priors, context.indexed);
+    let outcome = identified(found, image, &field, priors, context);
     let outcome = match outcome {
-        Outcome::NotIdentified(reason) if may_be_negative(&reason) => {
+        Outcome::NotIdentified(reason) if context.explains && may_be_negative(&reason) => {
             let negative = negative(frame, detections, detector);
             Outcome::NotIdentified(negative.map_or(reason, Reason::Diagnosis))
         }
@@ -308,7 +308,7 @@ pub(super) fn identified(
     image: Option<(&Frame, &Detections)>,
     field: &StarField,
     priors: &Priors,
-    indexed: &IndexedCatalog,
+    context: &Context,
 ) -> Outcome {
     let failure = match found {
         Ok(mut found) => {
@@ -325,7 +325,9 @@ pub(super) fn identified(
         priors,
         failure,
     };
-    let cause = diagnose(&case, indexed);
+    let cause = (context.explains)
+        .then(|| diagnose(&case, context.indexed))
+        .flatten();
     Outcome::NotIdentified(cause.map_or(Reason::Search(failure), Reason::Diagnosis))
 }
 

@@ -44,7 +44,7 @@ pub use body_in_frame::BodyInFrame;
 pub use bright_stars::MissingStar;
 pub use context::DEFAULT_TIME_LIMIT_S;
 pub use context::{Context, Workspace};
-pub use deep::{DeepProgress, DeepSky};
+pub use deep::{DeepProgress, DeepSky, IndexingWork, OnProgress};
 pub use error::Error;
 pub use error::remedies_of;
 pub use fixed_camera::FixedCamera;

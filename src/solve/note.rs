@@ -20,7 +20,7 @@ use crate::frame::{
     Assumption, DefectiveColumn, FrameMetadata, IgnoredValue, ImageChoice, Orientation,
 };
 use crate::identify::diagnosis::{DoubleImage, RepeatedSky};
-use crate::identify::{DateZone, Identification, Priors, ScalePrior, ScaleSource};
+use crate::identify::{DateZone, Identification, Priors, ScalePrior, ScaleSource, SkyRegion};
 use crate::photometry::FramePhotometry;
 use crate::photometry::comparison::{Comparison, Contradiction, ObservingSetup};
 use std::fmt;
@@ -71,6 +71,13 @@ pub enum Note {
     WrongHeaderScale {
         /// Smallest and largest pixel scale that the header allows, in radians.
         pixel_scale_rad: [f64; 2],
+    },
+    /// The frame's centre is not where it was stated to be.
+    OtherDirection {
+        /// Distance of the centre from the stated direction, in radians.
+        distance_rad: f64,
+        /// Largest distance that was stated, in radians.
+        radius_rad: f64,
     },
     /// Site, date and attitude contradict each other: the centre was below the horizon.
     BelowHorizon {
@@ -165,6 +172,7 @@ impl Note {
             Self::MoreStars { .. } => "more_stars",
             Self::RoundPicture(_) => "round_picture",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
+            Self::OtherDirection { .. } => "direction_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::SiteOrTime(_) => "site_or_time_wrong",
             Self::ZoneAssumed => "time_zone_assumed",
@@ -265,6 +273,17 @@ impl Note {
         let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px()));
         is_wrong.then_some(Self::WrongHeaderScale {
             pixel_scale_rad: [low_rad, high_rad],
+        })
+    }
+
+    /// A direction that was stated, where it is not the true one.
+    pub(super) fn of_direction(other_than: Option<&SkyRegion>, outcome: &Outcome) -> Option<Self> {
+        let (stated, found) = (other_than?, outcome.identification()?);
+        let distance_rad = found.icrs_to_camera.boresight().angle_to(&stated.centre);
+        let radius_rad = stated.radius_rad;
+        (distance_rad > radius_rad).then_some(Self::OtherDirection {
+            distance_rad,
+            radius_rad,
         })
     }
 
@@ -448,6 +467,16 @@ impl fmt::Display for Note {
                 write_other_size(f, *known_px, *found_px)
             }
             Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
+            Self::OtherDirection {
+                distance_rad,
+                radius_rad,
+            } => write!(
+                f,
+                "the frame's center is {:.1}° from the given direction, beyond the radius of {:.2}°: the direction \
+                 was not used",
+                distance_rad * DEG_PER_RAD,
+                radius_rad * DEG_PER_RAD
+            ),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
                 "site, date and attitude contradict each other: the center of the frame would be {:.1}° \

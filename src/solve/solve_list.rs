@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::deep::{Answered, identify_in_all};
+use super::deep::{Answered, InAll, identify_in_all};
 use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
 use super::note::Note;
 use super::outcome::Outcome;
@@ -31,7 +31,8 @@ fn priors_of(size: Size, context: &Context) -> Priors {
     }
 }
 
-/// Identifies the stars of a list of centroids. Every prior is a hard constraint.
+/// Identifies the stars of a list of centroids. A direction that is stated is tried first; every other prior is a
+/// hard constraint.
 ///
 /// Where nobody states the size of the frame, it is as large as the centroids reach, and the errors have
 /// that its centre is not known.
@@ -82,7 +83,7 @@ pub fn solve_centroids(
     let [width, height] = frame.size.sides();
     let priors = &priors_of(frame.size, context);
     let sources: Vec<Source> = list.centroids.iter().map(Source::from).collect();
-    let interrupt = workspace.of_frame.clone();
+    let limits = workspace.limits();
     let mut search = ListSearch {
         list: &list,
         sources: &sources,
@@ -92,7 +93,11 @@ pub fn solve_centroids(
     };
     let known = (context, priors);
     let identify = |context: &Context, priors: &Priors| search.identify(context, priors);
-    let (answer, deep) = identify_in_all(known, frame.size, &interrupt, identify);
+    let InAll {
+        answer,
+        named: deep,
+        other_than,
+    } = identify_in_all(known, frame.size, &limits, identify);
     let ConfirmedPlaceTime {
         mut outcome,
         priors,
@@ -118,6 +123,7 @@ pub fn solve_centroids(
         .map(Note::RowsLeftOut)
         .chain(unknown)
         .chain(Note::of_guessed_size(&frame, found))
+        .chain(Note::of_direction(other_than.as_ref(), &outcome))
         .chain(Note::of_place_time(place_time.as_ref()))
         .chain(Note::of_observation(observation.as_ref(), priors, &outcome))
         .chain(second_images.double.map(Note::DoubleImage))
@@ -172,7 +178,7 @@ impl ListSearch<'_, '_> {
             let field = self.list.star_field_in(self.size, places);
             let workspace = &mut self.workspace.identify;
             let (found, _) = search((&field, None), priors, context, workspace, self.clock);
-            identified(found, None, &field, priors, context.indexed)
+            identified(found, None, &field, priors, context)
         };
         let answer = through_air_or_not(priors.places(), &mut identify);
         let known = (priors, context.utc_offset);

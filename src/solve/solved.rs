@@ -19,7 +19,9 @@ use crate::ephemeris::observer::Observation;
 use crate::ephemeris::places::StarPlaces;
 use crate::ephemeris::solar_system::moon_and_sun;
 use crate::frame::{DefectiveColumn, Frame};
-use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyView, SourceIndex};
+use crate::identify::{
+    Identification, PredictedStar, Priors, ScalePrior, SkyRegion, SkyView, SourceIndex,
+};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame, PictureColors};
 use crate::sky::{self, DarkLevel, DarkSource, SkyMap, SkyPicture, StatedLimit};
@@ -47,6 +49,8 @@ pub(super) struct SolvedFrame<'a> {
     pub second_images: SecondImages,
     /// The scale that was dropped because nothing matched with it.
     pub dropped_scale: Option<ScalePrior>,
+    /// The direction that was stated, where the stars show another.
+    pub other_than: Option<SkyRegion>,
     /// The number of stars that were to be measured, where more had to be.
     pub more_stars: Option<usize>,
     /// Columns that hold no light, and were left out.
@@ -264,6 +268,7 @@ impl SolvedFrame<'_> {
             .chain(Note::of_defects(self.defects))
             .chain(self.mosaic.map(Note::ColorMosaic))
             .chain(Note::of_scale(self.dropped_scale, outcome))
+            .chain(Note::of_direction(self.other_than.as_ref(), outcome))
             .chain(self.more_stars.map(|wanted| Note::MoreStars { wanted }))
             .chain(Note::of_lens(self.context.lens.as_deref(), outcome))
             .chain(Note::of_circle(self.detections.sky_area.as_ref(), outcome))

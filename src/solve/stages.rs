@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::deep::{Answered, identify_in_all};
+use super::deep::{Answered, InAll, identify_in_all};
 use super::error::Error;
 use super::explanation::explained;
 use super::identification::{SecondImages, identify_stars, observation, through_air_or_not};
@@ -27,7 +27,7 @@ use crate::detect::{
 use crate::ephemeris::places::StarPlaces;
 use crate::frame::{self, Frame, FrameError, MemoryLimit, Mosaic};
 use crate::identify::diagnosis::Unexplained;
-use crate::identify::{Choices, IndexedCatalog, Priors, ScalePrior, SearchFailure};
+use crate::identify::{Choices, IndexedCatalog, Priors, ScalePrior, SearchFailure, SkyRegion};
 use crate::photometry::PictureColors;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -218,6 +218,7 @@ fn solve(
         mosaic,
         stars,
         deep,
+        other_than,
     } = found;
     let IdentifiedStars {
         mut outcome,
@@ -253,6 +254,7 @@ fn solve(
         bodies,
         second_images,
         dropped_scale,
+        other_than,
         more_stars,
         defects: &prepared.defects,
         photometry: None,
@@ -312,6 +314,8 @@ struct FoundStars {
     stars: IdentifiedStars,
     /// The stars that they are, where it took a deep catalogue.
     deep: Option<Arc<IndexedCatalog<'static>>>,
+    /// The direction that was stated, where the stars show another.
+    other_than: Option<SkyRegion>,
 }
 
 /// Which stars they are.
@@ -387,12 +391,17 @@ impl StarSearch<'_, '_> {
         let Some((detections, mosaic)) = self.detect(config, clock)? else {
             return Ok(None);
         };
-        let (stars, deep) = self.identify_in_all(&detections, clock);
+        let InAll {
+            answer: stars,
+            named: deep,
+            other_than,
+        } = self.identify_in_all(&detections, clock);
         let mut found = FoundStars {
             detections,
             mosaic,
             stars,
             deep,
+            other_than,
         };
         let held = self.context.fixed_camera.as_ref();
         if !found.are_identified()
@@ -410,18 +419,17 @@ impl StarSearch<'_, '_> {
         Ok(Some(found))
     }
 
-    /// Identifies stars with the catalogue of all frames or with deep ones. Also returns the stars of the deep one
-    /// that they are.
+    /// Identifies stars with the catalogue of all frames or with deep ones.
     fn identify_in_all(
         &mut self,
         detections: &Detections,
         clock: &mut Stopwatch,
-    ) -> (IdentifiedStars, Option<Arc<IndexedCatalog<'static>>>) {
+    ) -> InAll<IdentifiedStars> {
         let (context, priors, prepared) = (self.context, self.priors, self.prepared);
         let frame = prepared.frame();
         let size = Size::new(frame.width, frame.height);
-        let interrupt = self.workspace.of_frame.clone();
-        identify_in_all((context, priors), size, &interrupt, |context, priors| {
+        let limits = self.workspace.limits();
+        identify_in_all((context, priors), size, &limits, |context, priors| {
             let mut search = StarSearch {
                 prepared,
                 priors,
@@ -495,6 +503,7 @@ impl StarSearch<'_, '_> {
                     mosaic: None,
                     stars,
                     deep: None,
+                    other_than: None,
                 }));
             }
         }

@@ -41,6 +41,53 @@ impl HealpixCell {
     }
 }
 
+/// One of twelve equal parts of the sky: a face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SkyZone(u32);
+
+impl SkyZone {
+    /// Their number.
+    pub const COUNT: u32 = 12;
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT).map(Self)
+    }
+
+    /// Its number.
+    pub const fn number(self) -> u32 {
+        self.0
+    }
+
+    /// Its centre.
+    pub fn centre(self) -> UnitVector<Icrs> {
+        let (row, column) = (self.0 / 4, f64::from(self.0 % 4));
+        let (z, offset): (f64, f64) = match row {
+            0 => (2.0 / 3.0, 0.5),
+            1 => (0.0, 0.0),
+            _ => (-2.0 / 3.0, 0.5),
+        };
+        UnitVector::from_ra_dec((column + offset) * FRAC_PI_2, libm::asin(z))
+    }
+
+    /// A circle of this radius around its centre holds it: to a pole it is acos(2/3).
+    pub const RADIUS_RAD: f64 = 48.2 * RAD_PER_DEG;
+
+    /// Whether a direction lies in it, or not farther than this beside it.
+    pub fn contains(self, direction: &UnitVector<Icrs>, margin_rad: f64) -> bool {
+        let is_in = |direction: &UnitVector<Icrs>| HealpixCell::of(direction, 1).face == self.0;
+        if is_in(direction) {
+            return true;
+        }
+        let (east, north) = direction.east_north();
+        [east, -east, north, -north].iter().any(|side| {
+            is_in(&UnitVector::from_vector(
+                direction.as_vector() + side * margin_rad,
+            ))
+        })
+    }
+}
+
 /// The face, and the place there from 0 to 1, near the equator.
 fn equatorial(z: f64, quarters: f64) -> (u32, f64, f64) {
     // Lines of constant x and y are straight in z and right ascension.
@@ -117,6 +164,23 @@ mod tests {
         assert!(counts.keys().all(|number| *number < 192));
         let range = counts.values().min().unwrap()..=counts.values().max().unwrap();
         assert!(**range.start() > 380 && **range.end() < 420, "{range:?}");
+    }
+
+    #[test]
+    fn zones_are_in_their_circles_and_each_direction_is_in_one() {
+        for number in 0..20_000 {
+            let share = |factor: f64| (factor * f64::from(number)).fract();
+            let dec_rad = libm::asin(2.0 * share(0.754_877_666_2) - 1.0);
+            let direction = UnitVector::from_ra_dec(TAU * share(0.618_033_988_7), dec_rad);
+            let zones: Vec<SkyZone> = SkyZone::all()
+                .filter(|zone| zone.contains(&direction, 0.0))
+                .collect();
+            assert_eq!(zones.len(), 1);
+            assert!(zones[0].centre().angle_to(&direction) < SkyZone::RADIUS_RAD);
+        }
+        let across = UnitVector::from_ra_dec(FRAC_PI_2 + 0.001, 0.9);
+        let zones = SkyZone::all().filter(|zone| zone.contains(&across, 0.01));
+        assert_eq!(zones.count(), 2);
     }
 
     /// Centres of faces, from the paper's figure 4.

@@ -6,23 +6,28 @@
 //! # Kinds
 //! - Index files of astrometry.net: the series 4100, 4200 and 5200, and others of the same form.
 //! - Databases of ASTAP and HNSKY, in files that end in `.1476`, `.290` and `.001`.
+//! - Tables of Gaia's stars, from its archive or from VizieR, which are held in memory.
 //! - The compact form, which is loaded whole when its stars are first needed.
 
 mod astap;
 mod astrometry;
+mod coverage;
 mod error;
 mod fits_tables;
 mod healpix;
 mod installed;
 mod region;
 mod stored;
+mod tables;
 
 pub use error::Damage;
+pub(crate) use healpix::SkyZone;
 pub use installed::installed_paths;
 pub use region::Region;
 
 use super::folder::files_in;
-use super::{Catalog, CatalogError, Star};
+use super::import::LoadedCatalog;
+use super::{Catalog, CatalogError, SourceFile, Star};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::WHOLE_SKY_SQ_DEG;
@@ -32,6 +37,7 @@ use region::BrightestStars;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 use stored::StoredCatalog;
+use tables::TableStars;
 use xxhash_rust::xxh3::Xxh3;
 
 /// Bytes of a file by which its kind is told: header cards of some generators come after a long history.
@@ -53,6 +59,8 @@ enum Stock {
     Areas(AreaDatabase),
     /// Its database of bright stars.
     Wide(WideDatabase),
+    /// Tables of Gaia.
+    Tables(TableStars),
     /// A catalogue in the compact form.
     Stored(StoredCatalog),
 }
@@ -120,7 +128,7 @@ impl DeepCatalog {
     /// # Errors
     /// As [`find`](Self::find).
     pub fn find_installed(path: &Path) -> Result<Vec<Self>, CatalogError> {
-        let (mut indexes, mut found) = (Vec::new(), Vec::new());
+        let (mut indexes, mut tables, mut found) = (Vec::new(), Vec::new(), Vec::new());
         let (files, beside) = if path.is_dir() {
             let files = files_in(path)?;
             (files.clone(), files)
@@ -134,6 +142,7 @@ impl DeepCatalog {
             match Stock::of_file(file)? {
                 Some(Stock::Indexes(index)) => indexes.extend(index),
                 Some(stock) => found.push(stock),
+                None if TableStars::is_one(file)? => tables.push(file.clone()),
                 None => {}
             }
         }
@@ -146,6 +155,9 @@ impl DeepCatalog {
                 scale.then_with(|| a.path.cmp(&b.path))
             });
             found.push(Stock::Indexes(indexes));
+        }
+        if !tables.is_empty() {
+            found.push(Stock::Tables(TableStars::read(path, tables)?));
         }
         let of = |stock| Self {
             path: path.to_owned(),
@@ -177,6 +189,13 @@ impl DeepCatalog {
                 share_of_sky: 1.0,
                 epoch_year: None,
             },
+            Stock::Tables(tables) => DeepContents {
+                kind: tables.loaded.catalog.title().to_owned(),
+                band: "Johnson V, from those of Gaia".to_owned(),
+                stars: tables.stars().len() as u64,
+                share_of_sky: tables.share_of_sky,
+                epoch_year: Some(tables.loaded.catalog.epoch_year()),
+            },
             Stock::Stored(StoredCatalog { summary, .. }) => DeepContents {
                 kind: summary.title.clone(),
                 band: "Johnson V".to_owned(),
@@ -187,11 +206,28 @@ impl DeepCatalog {
         }
     }
 
+    /// Its files that are held in memory, with what became of their records; none for other kinds.
+    pub fn files(&self) -> &[SourceFile] {
+        match &self.stock {
+            Stock::Tables(tables) => &tables.loaded.files,
+            _ => &[],
+        }
+    }
+
+    /// All of it, where it is held in memory.
+    pub(super) fn into_loaded(self) -> Result<LoadedCatalog, Self> {
+        match self.stock {
+            Stock::Tables(tables) => Ok(tables.loaded),
+            stock => Err(Self { stock, ..self }),
+        }
+    }
+
     /// Changes when one of its files does: with its place, its length or the time at which it was written.
     pub fn fingerprint(&self) -> u64 {
         let files: Vec<&Path> = match &self.stock {
             Stock::Indexes(indexes) => indexes.iter().map(|index| &*index.path).collect(),
             Stock::Areas(database) => database.files().collect(),
+            Stock::Tables(tables) => tables.files.iter().map(|file| &**file).collect(),
             Stock::Wide(_) | Stock::Stored(_) => vec![&self.path],
         };
         let mut state = Xxh3::new();
@@ -231,6 +267,7 @@ impl DeepCatalog {
                 .stars_in(&region, interrupt, &mut add)
                 .map_err(|(path, error)| CatalogError::Deep { path, error })?,
             Stock::Wide(wide) => wide.stars.iter().copied().for_each(add),
+            Stock::Tables(tables) => tables.stars().iter().copied().for_each(add),
             Stock::Stored(stored) => stored.catalog()?.stars().iter().copied().for_each(add),
         }
         Ok(brightest.into_stars())
@@ -262,13 +299,14 @@ impl Stock {
 
 /// Whether a file of a directory may be one that has a catalogue alone, by its ending: others are not opened.
 fn may_be_one(path: &Path) -> bool {
-    const ENDINGS: [&str; 5] = ["fits", "fit", "fts", "001", "cat"];
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    ending.is_some_and(|ending| {
-        ENDINGS
-            .iter()
-            .any(|known| ending.eq_ignore_ascii_case(known))
-    })
+    const ENDINGS: [&str; 11] = [
+        "fits", "fit", "fts", "001", "cat", "csv", "tsv", "ecsv", "vot", "votable", "xml",
+    ];
+    let name = path.file_name().and_then(|name| name.to_str());
+    let name = name.unwrap_or_default().to_ascii_lowercase();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let ending = name.rsplit_once('.').map(|(_, ending)| ending);
+    ending.is_some_and(|ending| ENDINGS.contains(&ending))
 }
 
 /// Of the files that may reach a region those with the smallest quads, which have most stars.

@@ -29,12 +29,15 @@ impl GeneralColumns {
         headings: &[Heading],
         note_of: impl Fn(&str) -> Option<String>,
     ) -> Result<Self, Vec<&'static str>> {
-        let id =
-            IdColumns::find(headings).ok_or("of identifiers (id, name, hip, tyc, source_id, ...)");
+        let magnitude = MagnitudeColumns::find(headings);
+        let is_of_gaia = magnitude
+            .as_ref()
+            .is_some_and(MagnitudeColumns::are_of_gaia);
+        let id = IdColumns::find(headings, is_of_gaia)
+            .ok_or("of identifiers (id, name, hip, tyc, source_id, ...)");
         let position = PositionColumns::find(headings)
             .ok_or("of right ascensions and declinations (ra and dec, raj2000 and dej2000, ...)");
-        let magnitude = MagnitudeColumns::find(headings)
-            .ok_or("of magnitudes (vmag, mag, vtmag, phot_g_mean_mag, ...)");
+        let magnitude = magnitude.ok_or("of magnitudes (vmag, mag, vtmag, phot_g_mean_mag, ...)");
         let (id, position, magnitude) = match (id, position, magnitude) {
             (Ok(id), Ok(position), Ok(magnitude)) => (id, position, magnitude),
             (_, Err(_), Err(_)) => return Err(Vec::new()),
@@ -44,7 +47,8 @@ impl GeneralColumns {
             }
         };
         let ra = &headings[position.ra.cell];
-        let epoch = Epoch::find(headings, ra, &note_of(&ra.text).unwrap_or_default());
+        let note = note_of(&ra.text).unwrap_or_default();
+        let epoch = Epoch::find(headings, ra, &note, is_of_gaia);
         let name = find_column(headings, "name proper");
         Ok(Self {
             texts: headings
@@ -74,9 +78,13 @@ impl GeneralColumns {
             Epoch::Column(cell) => format!("epoch {}", text(cell)),
             Epoch::Year(year) => format!("epoch J{year}"),
         };
+        let id = if id.is_empty() {
+            "the place".to_owned()
+        } else {
+            id.join("-")
+        };
         format!(
-            "identifier {}, position {} and {}, {}, {motion}, {epoch}",
-            id.join("-"),
+            "identifier {id}, position {} and {}, {}, {motion}, {epoch}",
             text(self.position.ra.cell),
             text(self.position.dec.cell),
             self.magnitude.description(text),
@@ -85,7 +93,12 @@ impl GeneralColumns {
 
     /// Where in a row the identifier is, and its heading.
     pub(super) fn id_location(&self) -> (RecordLocation, String) {
-        let cell = self.id.cells[0];
+        let cell = self
+            .id
+            .cells
+            .first()
+            .copied()
+            .unwrap_or(self.position.ra.cell);
         (RecordLocation::Column(cell + 1), self.texts[cell].clone())
     }
 

@@ -82,6 +82,14 @@ impl CatalogTable {
         })
     }
 
+    /// Whether its magnitudes are Gaia's.
+    pub(in crate::catalog) fn is_of_gaia(&self) -> bool {
+        match &self.columns {
+            CatalogColumns::Sky2000(..) => false,
+            CatalogColumns::General(columns) => columns.magnitude.are_of_gaia(),
+        }
+    }
+
     /// Whether a line holds no data: dashes, empty cells, repeated headings or units.
     fn is_decoration(&self, text: &[u8]) -> bool {
         let is_blank = |byte: &u8| *byte == self.separator || b"- ".contains(byte);

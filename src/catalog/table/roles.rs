@@ -2,6 +2,7 @@
 
 use super::headings::{Heading, HeadingUnit, find_column};
 use crate::base::angle::decimal;
+use crate::catalog::gaia;
 use crate::catalog::star::J2000_YEAR;
 use std::ops::RangeInclusive;
 
@@ -12,7 +13,7 @@ const VIZIER_RA_J2000: &str = "_raj2000";
 /// The columns of the identifier.
 pub(super) struct IdColumns {
     pub(super) kind: IdKind,
-    /// Three for the parts of a TYC number, else one.
+    /// Three for the parts of a TYC number, none where there are none, else one.
     pub(super) cells: Vec<usize>,
 }
 
@@ -24,6 +25,8 @@ pub(super) enum IdKind {
     Hipparcos,
     /// Gaia's, or text.
     Gaia,
+    /// There is none: a star is called by its place.
+    Place,
     /// Numbers of this catalogue.
     NumberOf(&'static str),
     /// Numbers or text.
@@ -31,7 +34,8 @@ pub(super) enum IdKind {
 }
 
 impl IdColumns {
-    pub(super) fn find(headings: &[Heading]) -> Option<Self> {
+    /// A table of Gaia needs none.
+    pub(super) fn find(headings: &[Heading], is_of_gaia: bool) -> Option<Self> {
         /// Headings of identifiers, in order of preference.
         const IDENTIFIERS: [(&str, IdKind); 11] = [
             ("skymap skymap_number", IdKind::Skymap),
@@ -53,6 +57,13 @@ impl IdColumns {
             return Some(Self {
                 kind: IdKind::Tycho,
                 cells: vec![region, star, component],
+            });
+        }
+        if is_of_gaia {
+            let source = column("source_id").or_else(|| column("source designation"));
+            return Some(Self {
+                kind: source.map_or(IdKind::Place, |_| IdKind::Gaia),
+                cells: source.into_iter().collect(),
             });
         }
         let (kind, cell) = IDENTIFIERS
@@ -151,8 +162,46 @@ pub(super) enum MagnitudeColumns {
     },
     /// Tycho VT, and BT for the color.
     Tycho { bt: Option<usize>, vt: usize },
+    /// Gaia's G, and BP−RP for the color.
+    Gaia { g: usize, color: ColorColumns },
     /// A magnitude that approximates V.
     Approximate { cell: usize, band: &'static str },
+}
+
+/// The columns of Gaia's color BP−RP.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum ColorColumns {
+    /// None.
+    Unknown,
+    /// The color.
+    Color(usize),
+    /// BP and RP.
+    Magnitudes { bp: usize, rp: usize },
+}
+
+impl ColorColumns {
+    fn find(headings: &[Heading]) -> Self {
+        let column = |labels: &str| find_column(headings, labels);
+        if let Some(color) = column("bp_rp bp-rp") {
+            return Self::Color(color);
+        }
+        match (
+            column("phot_bp_mean_mag bpmag bp_mag"),
+            column("phot_rp_mean_mag rpmag rp_mag"),
+        ) {
+            (Some(bp), Some(rp)) => Self::Magnitudes { bp, rp },
+            _ => Self::Unknown,
+        }
+    }
+
+    /// The columns used.
+    pub(super) fn cells(self) -> Vec<usize> {
+        match self {
+            Self::Unknown => Vec::new(),
+            Self::Color(color) => vec![color],
+            Self::Magnitudes { bp, rp } => vec![bp, rp],
+        }
+    }
 }
 
 impl MagnitudeColumns {
@@ -163,7 +212,7 @@ impl MagnitudeColumns {
         const APPROXIMATE_V: [(&str, &str); 5] = [
             ("mag magnitude", "magnitude"),
             ("hpmag hp", "Hipparcos Hp"),
-            ("phot_g_mean_mag gmag g_mag g", "Gaia G"),
+            ("gmag g_mag g", "magnitude g"),
             ("vder", "derived V"),
             ("phot_visual_mag", "visual magnitude"),
         ];
@@ -176,10 +225,23 @@ impl MagnitudeColumns {
             let bt = column("btmag bt bt_mag");
             return Some(Self::Tycho { bt, vt });
         }
+        let g = column("phot_g_mean_mag").or_else(|| column("gmag g_mag"));
+        let color = ColorColumns::find(headings);
+        let is_of_vizier = column("source").is_some() && column("ra_icrs").is_some();
+        let has_color = !matches!(color, ColorColumns::Unknown);
+        let is_gaia = column("phot_g_mean_mag").is_some() || has_color || is_of_vizier;
+        if let Some(g) = g.filter(|_| is_gaia) {
+            return Some(Self::Gaia { g, color });
+        }
         APPROXIMATE_V.iter().find_map(|&(labels, band)| {
             let cell = column(labels)?;
             Some(Self::Approximate { cell, band })
         })
+    }
+
+    /// Whether they are Gaia's.
+    pub(super) const fn are_of_gaia(&self) -> bool {
+        matches!(self, Self::Gaia { .. })
     }
 
     /// The columns used, for people; `text` gives their headings.
@@ -195,6 +257,11 @@ impl MagnitudeColumns {
             } => format!("V {}, else {}", text(observed), text(derived)),
             Self::Tycho { bt: Some(bt), vt } => format!("V from {} and {}", text(vt), text(bt)),
             Self::Tycho { bt: None, vt } => format!("V from {}", text(vt)),
+            Self::Gaia { g, color } => {
+                let used = [vec![g], color.cells()].concat();
+                let used: Vec<&str> = used.into_iter().map(text).collect();
+                format!("V from {}", used.join(", "))
+            }
             Self::Approximate { cell, band } => format!("{band} {} for V", text(cell)),
         }
     }
@@ -252,10 +319,15 @@ pub(super) const EPOCH_YEARS: RangeInclusive<f64> = 1850.0..=2100.0;
 impl Epoch {
     /// The epoch of the right ascensions under `ra`; `note` is what the file says about that
     /// column.
-    pub(super) fn find(headings: &[Heading], ra: &Heading, note: &str) -> Self {
-        match find_column(headings, "ref_epoch epoch ep") {
-            Some(cell) if ra.label != VIZIER_RA_J2000 => Self::Column(cell),
-            _ => Self::Year(epoch_in(note).unwrap_or(J2000_YEAR)),
+    pub(super) fn find(headings: &[Heading], ra: &Heading, note: &str, is_of_gaia: bool) -> Self {
+        // A table of Gaia at VizieR has its stars at two epochs.
+        let is_at_j2000 = ra.label == VIZIER_RA_J2000 || (is_of_gaia && ra.label == "raj2000");
+        let column = find_column(headings, "ref_epoch epoch ep").filter(|_| !is_at_j2000);
+        match (column, epoch_in(note)) {
+            (Some(cell), _) => Self::Column(cell),
+            (None, Some(year)) => Self::Year(year),
+            (None, None) if is_of_gaia && !is_at_j2000 => Self::Year(gaia::EPOCH_YEAR),
+            (None, None) => Self::Year(J2000_YEAR),
         }
     }
 }

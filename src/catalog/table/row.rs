@@ -4,7 +4,8 @@ use super::cells::unquoted;
 use super::columns::GeneralColumns;
 use super::headings::HeadingUnit;
 use super::roles::{
-    AngleColumn, EPOCH_YEARS, Epoch, IdColumns, IdKind, MagnitudeColumns, PositionColumns,
+    AngleColumn, ColorColumns, EPOCH_YEARS, Epoch, IdColumns, IdKind, MagnitudeColumns,
+    PositionColumns,
 };
 use crate::base::angle::{Angle, decimal};
 use crate::catalog::contents::NAME_BYTES_MAX;
@@ -14,7 +15,7 @@ use crate::catalog::import::{NamedStar, Parsed, Rejection, both_or_neither};
 use crate::catalog::position::{EXPECTED_DEC, Position};
 use crate::catalog::star::{J2000_YEAR, MAG_LIMIT, PM_LIMIT_MAS_PER_YR, rounded_mag};
 use crate::catalog::tycho2::johnson;
-use crate::catalog::{HipparcosId, Star, StarFlags, StarId, TychoId};
+use crate::catalog::{HipparcosId, PlaceId, Star, StarFlags, StarId, TychoId, gaia};
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
 use std::sync::atomic::Ordering;
@@ -30,8 +31,8 @@ impl GeneralRow<'_> {
     /// Parses the star and its name.
     pub(super) fn star(&self) -> Parsed<NamedStar> {
         let columns = self.columns;
-        let (id, mut name) = self.id()?;
         let position = self.position()?;
+        let (id, mut name) = self.id(position)?;
         let magnitude = self.magnitude()?;
         let bv_mag = match columns.b_minus_v {
             Some(cell) => {
@@ -77,8 +78,13 @@ impl GeneralRow<'_> {
     }
 
     /// The identifier, and the name that replaces it if it is not a number.
-    fn id(&self) -> Parsed<(StarId, Option<String>)> {
+    fn id(&self, position: Option<Position>) -> Parsed<(StarId, Option<String>)> {
         let IdColumns { kind, cells } = &self.columns.id;
+        if *kind == IdKind::Place {
+            let position = position.ok_or(Rejection::NoPosition)?;
+            let place = PlaceId::of(&position.direction());
+            return Ok((StarId::Place(place), None));
+        }
         let parts: Option<Vec<&str>> = cells.iter().map(|&cell| self.value(cell)).collect();
         let error = |expected| self.error(cells[0], expected);
         let text = parts.ok_or_else(|| error("an identifier"))?.join(" ");
@@ -102,7 +108,7 @@ impl GeneralRow<'_> {
             IdKind::NumberOf(catalog) if number().is_some() => {
                 return self.named(format!("{catalog} {text}"));
             }
-            IdKind::NumberOf(_) => return self.named(text),
+            IdKind::NumberOf(_) | IdKind::Place => return self.named(text),
         };
         Ok((known.ok_or_else(|| error(expected))?, None))
     }
@@ -183,8 +189,27 @@ impl GeneralRow<'_> {
                 let bt = bt.map_or(Ok(None), number)?;
                 johnson(bt, number(vt)?).map(|(v_mag, bv_mag)| (v_mag, bv_mag, true))
             }
+            MagnitudeColumns::Gaia { g, color } => {
+                let color = self.gaia_color(color)?;
+                let johnson = |g: f64| gaia::johnson(g, color);
+                number(g)?
+                    .map(johnson)
+                    .map(|(v_mag, bv_mag)| (v_mag, bv_mag, true))
+            }
             MagnitudeColumns::Approximate { cell, .. } => {
                 number(cell)?.map(|v_mag| plain(v_mag, true))
+            }
+        })
+    }
+
+    /// BP−RP, if it is known.
+    fn gaia_color(&self, columns: ColorColumns) -> Parsed<Option<f64>> {
+        let number = |cell: usize| self.in_range(cell, MAG_LIMIT, "a magnitude from -32 to 32");
+        Ok(match columns {
+            ColorColumns::Unknown => None,
+            ColorColumns::Color(color) => number(color)?,
+            ColorColumns::Magnitudes { bp, rp } => {
+                number(bp)?.zip(number(rp)?).map(|(bp, rp)| bp - rp)
             }
         })
     }

@@ -134,7 +134,6 @@ impl CalibrateArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
-            deep: None,
         })
     }
 }

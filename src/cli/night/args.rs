@@ -104,7 +104,6 @@ impl NightArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
-            deep: None,
         })
     }
 }

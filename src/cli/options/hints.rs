@@ -5,7 +5,8 @@ use super::stated::with_stated;
 use crate::cli::exit::CommandError;
 use anyhow::Context as _;
 use clap::Args;
-use serde::Serialize;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
 use starpipe::camera::data_sheet::CameraDescription;
 use starpipe::camera::formats::{from_opencv_yaml_within, from_platepar_within};
 use starpipe::camera::{CameraModel, KnownLens};
@@ -32,15 +33,15 @@ pub(crate) struct HintOptions {
     /// Tolerance of --fov or --pixel-scale, in percent [default: 10]
     #[arg(long, value_name = "PERCENT", allow_hyphen_values = true)]
     scale_error: Option<String>,
-    /// Approximate direction of the frame's center, in degrees or as 05h35m17s,-05d23m28s
-    #[arg(long, value_name = "RA,DEC", allow_hyphen_values = true)]
-    near: Option<String>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    direction: DirectionOptions,
     /// Maximum distance of the frame's center from --near, in degrees [default: 10]
     #[arg(
         long,
         value_name = "DEG",
         allow_hyphen_values = true,
-        requires = "near"
+        requires = "direction"
     )]
     radius: Option<String>,
     /// Date and time of the frames, as ISO 8601, in UTC unless it has an offset; used for proper motion
@@ -68,6 +69,43 @@ pub(crate) struct HintOptions {
     /// Fit the lens to each frame, even if --camera has a measured one
     #[arg(long, requires = "camera")]
     refine_lens: bool,
+}
+
+#[derive(Debug, Args)]
+#[group(id = "direction")]
+struct DirectionOptions {
+    /// Approximate direction of the frame's center, in degrees or as 05h35m17s,-05d23m28s; tried first
+    #[arg(long, value_name = "RA,DEC", allow_hyphen_values = true)]
+    near: Option<String>,
+    /// Right ascension of the same, in degrees or as 05h35m17s
+    #[arg(
+        long,
+        value_name = "RA",
+        allow_hyphen_values = true,
+        requires = "dec",
+        conflicts_with = "near"
+    )]
+    ra: Option<String>,
+    /// Declination of the same, in degrees or as -05d23m28s
+    #[arg(
+        long,
+        value_name = "DEC",
+        allow_hyphen_values = true,
+        requires = "ra",
+        conflicts_with = "near"
+    )]
+    dec: Option<String>,
+}
+
+/// As the library names it, however it is stated.
+impl Serialize for DirectionOptions {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let parts = self.ra.as_ref().zip(self.dec.as_ref());
+        let joined = parts.map(|(ra, dec)| format!("{ra},{dec}"));
+        let mut map = serializer.serialize_map(Some(1))?;
+        map.serialize_entry("near", &joined.as_ref().or(self.near.as_ref()))?;
+        map.end()
+    }
 }
 
 /// Largest error of a lens that is read from a file of another program: well below those that it is

@@ -141,7 +141,6 @@ impl ProcessArgs {
             calibration: self.calibration.read(camera.as_ref())?,
             camera,
             memory: self.memory.limit(),
-            deep: self.solving.deep()?,
         })
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn process_parts(
     let SolvingOptions {
         catalog, output, ..
     } = &arguments.solving;
-    catalog.with_index_reporting(!output.quiet, |pool, indexed| {
+    catalog.with_deep(!output.quiet, |pool, indexed, deep| {
         let ProcessArgs {
             calibration, page, ..
         } = arguments;
@@ -41,10 +41,12 @@ pub(super) fn process_parts(
         let archive = Archive::claim(directory, plan, &configuration);
         let archive = archive.map_err(|error| CommandError::of_store(error, "--out-parquet"))?;
         report_mended(archive.mended());
+        let mut context = solving.context(indexed);
+        context.deep = deep;
         let worker = Worker(InputSolver {
             pool,
             inputs: &inputs,
-            context: solving.context(indexed),
+            context,
             memory: solving.memory,
             sink: TableRowSink(indexed.catalog()),
         });

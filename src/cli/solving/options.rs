@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use starpipe::identify::{Effort, NAME_ODDS};
 use starpipe::report::tables::TableFormat;
-use starpipe::solve::{DeepSky, SolveOptions};
+use starpipe::solve::SolveOptions;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -163,10 +163,5 @@ impl SolvingOptions {
     pub(crate) fn options(&self) -> Result<SolveOptions, CommandError> {
         let options = with_stated(self.hints.options()?, &self.identification)?;
         with_stated(options, &self.limit)
-    }
-
-    /// The deep catalogues for narrow fields.
-    pub(crate) fn deep(&self) -> anyhow::Result<Option<DeepSky>> {
-        self.catalog.deep(!self.output.quiet)
     }
 }

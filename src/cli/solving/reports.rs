@@ -6,7 +6,7 @@ use super::printer::Printer;
 use super::result_files::ResultFiles;
 use super::solver::{InputSolver, Sink};
 use crate::cli::exit::{CommandError, Exit, OutcomeTally};
-use crate::cli::output::messages::{one_line, report_error, report_warning};
+use crate::cli::output::messages::report_error;
 use crate::cli::output::overwrite;
 use crate::cli::progress::frames_bar;
 use indicatif::ProgressBar;
@@ -16,7 +16,7 @@ use starpipe::catalog::Catalog;
 use starpipe::frame::{ImageName, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
 use starpipe::report::FrameReport;
-use starpipe::solve::{Context, DeepSky, SolveOptions};
+use starpipe::solve::{Context, SolveOptions};
 use starpipe::store::FrameRow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -28,15 +28,12 @@ pub(crate) struct SolvingPlan {
     pub(crate) camera: Option<CameraDescription>,
     pub(crate) calibration: Option<Calibration>,
     pub(crate) memory: MemoryLimit,
-    /// For fields that the catalog is too sparse for.
-    pub(crate) deep: Option<DeepSky>,
 }
 
 impl SolvingPlan {
     pub(crate) fn context<'a>(&'a self, indexed: &'a IndexedCatalog<'a>) -> Context<'a> {
         let mut context = Context::new(indexed).with_options(&self.options, self.camera.clone());
         context.calibration = self.calibration.as_ref();
-        context.deep = self.deep.as_ref();
         context
     }
 }
@@ -67,8 +64,9 @@ pub(crate) fn report_all(
     let files = ResultFiles::new(&output, plan.memory)?;
     let needs_rows = run.printer.needs_rows();
     if !paths.is_empty() {
-        catalog.with_index_reporting(!output.quiet, |pool, indexed| {
+        catalog.with_deep(!output.quiet, |pool, indexed, deep| {
             let mut context = plan.context(indexed);
+            context.deep = deep;
             context.measure_known_sky = true;
             let solver = InputSolver {
                 pool,
@@ -86,11 +84,6 @@ pub(crate) fn report_all(
         })?;
     }
     run.progress.finish_and_clear();
-    if let Some(deep) = plan.deep.as_ref().filter(|_| !output.quiet) {
-        for error in deep.take_errors() {
-            report_warning(format_args!("{}; it was not used", one_line(&error)));
-        }
-    }
     let _ = run.printer.finish(&run.tally)?;
     Ok(run.tally.exit())
 }

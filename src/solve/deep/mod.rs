@@ -8,5 +8,5 @@ mod plan;
 mod search;
 mod sky;
 
-pub(super) use search::{Answered, identify_in_all};
-pub use sky::{DeepProgress, DeepSky};
+pub(super) use search::{Answered, InAll, identify_in_all};
+pub use sky::{DeepProgress, DeepSky, IndexingWork, OnProgress};

@@ -1,8 +1,8 @@
 //! Which parts of the sky are searched for a narrow field, and for fields of which width.
 
 use crate::base::size::Size;
-use crate::base::units::RAD_PER_DEG;
-use crate::catalog::deep::Region;
+use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
+use crate::catalog::deep::{DeepContents, Region, SkyZone};
 use crate::identify::{Priors, SkyRegion};
 
 /// Fields at least this wide have stars enough in the catalogue of all frames.
@@ -13,24 +13,80 @@ const WIDEST_RAD: f64 = 3.0 * RAD_PER_DEG;
 const NARROWEST_RAD: f64 = 0.15 * RAD_PER_DEG;
 /// Fields wider than this are not searched: the brightest stars of a deep catalogue are those of the other.
 const MAX_RAD: f64 = 6.0 * RAD_PER_DEG;
-/// The fields for which the stars of the whole sky are indexed.
-pub const FIELDS_OF_SKY_RAD: [f64; 2] = [0.375 * RAD_PER_DEG, WIDE_RAD];
 /// Stars in the smallest field that are indexed, where there are as many.
 const STARS_PER_FIELD: f64 = 40.0;
 /// Most stars that an index has.
-pub const MAX_STARS: f64 = 2_000_000.0;
+const MAX_STARS: f64 = 2_000_000.0;
 /// Widths of the narrowest field over that of a catalogue in which it is still tried.
 const BELOW_NARROWEST: f64 = 0.7;
 
 /// A part of the sky, and the fields that are searched there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attempt {
-    /// The part of the sky, with the density of stars that are wanted there; `None` for all of it.
-    pub region: Option<Region>,
-    /// Where the frame's centre may lie in it.
-    pub near: Option<SkyRegion>,
+    /// Where.
+    pub part: Part,
     /// The narrowest and the widest field, in radians.
     pub fov_range_rad: [f64; 2],
+}
+
+/// Which part of the sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Part {
+    /// The surroundings of a direction, with the density of stars that are wanted there, and where in them the
+    /// frame's centre may lie.
+    Near(Region, SkyRegion),
+    /// All of it, or a twelfth.
+    Sweep(Sweep),
+}
+
+/// A part of the sky whose index is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// Stars in a square degree that are wanted.
+    pub per_sq_deg: f64,
+    /// The twelfth, unless it is all of the sky.
+    pub zone: Option<SkyZone>,
+    /// Stars that all parts together have.
+    pub stars: f64,
+}
+
+/// What is indexed of the whole sky for fields from a width on. Each level has twice the stars of the level before,
+/// so that a field narrower by √2 has as many.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Level(i32);
+
+impl Level {
+    /// The narrowest field of the first level.
+    const FIRST_RAD: f64 = 0.375 * RAD_PER_DEG;
+    /// 16 million stars, for fields from 0.18° on.
+    const LAST: i32 = 3;
+
+    fn narrowest_rad(self) -> f64 {
+        Self::FIRST_RAD / libm::exp2(f64::from(self.0) / 2.0)
+    }
+
+    fn per_sq_deg(self) -> f64 {
+        MAX_STARS / WHOLE_SKY_SQ_DEG * libm::exp2(f64::from(self.0))
+    }
+
+    /// The level for fields of this width or wider; for all fields, the last whose index is not divided.
+    fn of(low_rad: Option<f64>, deep: &DeepContents) -> Self {
+        /// A field has so many times the stars of the narrowest of its level.
+        const STARS: f64 = 1.7;
+        let is_enough = |level: &Self| match low_rad {
+            Some(low_rad) => level.narrowest_rad() * STARS.sqrt() <= low_rad,
+            None => Self(level.0 + 1).per_sq_deg() * area_sq_deg(deep) > MAX_STARS,
+        };
+        // A level beyond all stars of the catalogue has no more of them.
+        let has_all = |level: &Self| level.per_sq_deg() >= deep.per_sq_deg();
+        let mut levels = (0..Self::LAST).map(Self);
+        let level = levels.find(|level| is_enough(level) || has_all(level));
+        level.unwrap_or(Self(Self::LAST))
+    }
+}
+
+fn area_sq_deg(deep: &DeepContents) -> f64 {
+    WHOLE_SKY_SQ_DEG * deep.share_of_sky
 }
 
 /// Widths of the fields of frames with this width that the priors allow, in radians.
@@ -44,9 +100,8 @@ pub fn is_narrow(priors: &Priors, width_px: f64) -> bool {
     fov_range_rad(priors, width_px).is_some_and(|[_, widest]| widest < WIDE_RAD)
 }
 
-/// What is searched, the most likely first, in a catalogue whose narrowest field is this on average; nothing for wide
-/// fields.
-pub fn attempts(priors: &Priors, size: Size, narrowest_rad: f64) -> Vec<Attempt> {
+/// What is searched in a catalogue, the most likely first; nothing for wide fields.
+pub fn attempts(priors: &Priors, size: Size, deep: &DeepContents) -> Vec<Attempt> {
     let [width_px, height_px] = size.sides().map(|side| side as f64);
     let known = fov_range_rad(priors, width_px);
     if known.is_some_and(|[low, _]| low > MAX_RAD) {
@@ -58,14 +113,8 @@ pub fn attempts(priors: &Priors, size: Size, narrowest_rad: f64) -> Vec<Attempt>
     let mut attempts: Vec<Attempt> = hints
         .map(|near| near_attempt(near, fov_range_rad, height_px / width_px))
         .collect();
-    // Here and there it has more stars than on average.
-    let narrowest_rad = FIELDS_OF_SKY_RAD[0].max(BELOW_NARROWEST * narrowest_rad);
-    if priors.near.is_none() && fov_range_rad[1] > narrowest_rad {
-        attempts.push(Attempt {
-            region: None,
-            near: None,
-            fov_range_rad: FIELDS_OF_SKY_RAD,
-        });
+    if priors.near.is_none() {
+        attempts.extend(sweep(known, deep));
     }
     attempts
 }
@@ -81,14 +130,47 @@ fn near_attempt(near: SkyRegion, fov_range_rad: [f64; 2], aspect: f64) -> Attemp
         radius_rad: near.radius_rad + HALF_DIAGONAL * high * aspect.max(1.0),
         per_sq_deg: STARS_PER_FIELD / field_sq_deg,
     };
+    let region = Region {
+        per_sq_deg: region.per_sq_deg.min(MAX_STARS / region.area_sq_deg()),
+        ..region
+    };
     Attempt {
-        region: Some(Region {
-            per_sq_deg: region.per_sq_deg.min(MAX_STARS / region.area_sq_deg()),
-            ..region
-        }),
-        near: Some(near),
+        part: Part::Near(region, near),
         fov_range_rad,
     }
+}
+
+/// The search of the whole sky, part by part; nothing where the fields are too narrow for the catalogue, or wide.
+fn sweep(known: Option<[f64; 2]>, deep: &DeepContents) -> Vec<Attempt> {
+    /// The index of a level has fields up to so many times the narrowest, where they are known.
+    const WIDTHS: f64 = 3.0;
+    let level = Level::of(known.map(|[low, _]| low), deep);
+    // Here and there it has more stars than on average.
+    let narrowest_rad = BELOW_NARROWEST * deep.narrowest_fov_deg() * RAD_PER_DEG;
+    let narrowest_rad = narrowest_rad.max(level.narrowest_rad());
+    if known.is_some_and(|[low, high]| high <= narrowest_rad || low >= WIDE_RAD) {
+        return Vec::new();
+    }
+    let widest_rad = match known {
+        Some(_) if level != Level(0) => WIDTHS * level.narrowest_rad(),
+        _ => WIDE_RAD,
+    };
+    let per_sq_deg = level.per_sq_deg();
+    let stars = per_sq_deg.min(deep.per_sq_deg()) * area_sq_deg(deep);
+    let zones: Vec<Option<SkyZone>> = if stars > MAX_STARS {
+        SkyZone::all().map(Some).collect()
+    } else {
+        vec![None]
+    };
+    let attempt = |zone| Attempt {
+        part: Part::Sweep(Sweep {
+            per_sq_deg,
+            zone,
+            stars,
+        }),
+        fov_range_rad: [level.narrowest_rad(), widest_rad],
+    };
+    zones.into_iter().map(attempt).collect()
 }
 
 #[cfg(test)]
@@ -101,7 +183,20 @@ mod tests {
         width: 1500,
         height: 1000,
     };
-    const TYCHO_RAD: f64 = 0.5 * RAD_PER_DEG;
+
+    fn contents(per_sq_deg: f64, share_of_sky: f64) -> DeepContents {
+        DeepContents {
+            kind: String::new(),
+            band: String::new(),
+            stars: (per_sq_deg * WHOLE_SKY_SQ_DEG * share_of_sky) as u64,
+            share_of_sky,
+            epoch_year: None,
+        }
+    }
+
+    fn tycho2() -> DeepContents {
+        contents(45.4, 1.0)
+    }
 
     fn of_fov(fov_deg: f64) -> Priors {
         let scale = ScalePrior::by_user(Scale::FieldOfView(fov_deg * RAD_PER_DEG), 0.1);
@@ -111,21 +206,65 @@ mod tests {
         }
     }
 
+    fn sweep_of(attempt: &Attempt) -> Sweep {
+        match attempt.part {
+            Part::Sweep(sweep) => sweep,
+            Part::Near(..) => panic!("{attempt:?}"),
+        }
+    }
+
     #[test]
     fn a_field_of_which_nothing_is_known_is_searched_in_the_whole_sky() {
-        let attempts = attempts(&Priors::default(), SIZE, TYCHO_RAD);
-        assert_eq!(attempts.len(), 1);
-        assert_eq!(attempts[0].region, None);
-        assert_eq!(attempts[0].fov_range_rad, FIELDS_OF_SKY_RAD);
+        for deep in [tycho2(), contents(5000.0, 1.0)] {
+            let attempts = attempts(&Priors::default(), SIZE, &deep);
+            assert_eq!(attempts.len(), 1);
+            assert_eq!(sweep_of(&attempts[0]).zone, None);
+            assert_eq!(attempts[0].fov_range_rad, [Level::FIRST_RAD, WIDE_RAD]);
+        }
     }
 
     #[test]
     fn wide_fields_and_those_too_narrow_are_not_searched() {
-        assert!(attempts(&of_fov(12.0), SIZE, TYCHO_RAD).is_empty());
-        assert!(attempts(&of_fov(0.2), SIZE, TYCHO_RAD).is_empty());
+        assert!(attempts(&of_fov(12.0), SIZE, &tycho2()).is_empty());
+        assert!(attempts(&of_fov(3.0), SIZE, &tycho2()).is_empty());
+        assert!(attempts(&of_fov(0.2), SIZE, &tycho2()).is_empty());
+        assert!(attempts(&of_fov(0.05), SIZE, &contents(5000.0, 1.0)).is_empty());
         assert!(!is_narrow(&of_fov(12.0), 1500.0));
         assert!(is_narrow(&of_fov(1.0), 1500.0));
         assert!(!is_narrow(&Priors::default(), 1500.0));
+    }
+
+    #[test]
+    fn narrower_fields_take_more_stars_in_twelve_parts() {
+        let deep = contents(5000.0, 1.0);
+        for (fov_deg, parts, millions) in [
+            (1.0, 1, 2.0),
+            (0.5, 12, 4.0),
+            (0.3, 12, 8.0),
+            (0.2, 12, 16.0),
+        ] {
+            let attempts = attempts(&of_fov(fov_deg), SIZE, &deep);
+            assert_eq!(attempts.len(), parts, "{fov_deg}");
+            let found = sweep_of(&attempts[0]);
+            assert!((found.stars / 1e6 - millions).abs() < 0.01, "{found:?}");
+            let [low, high] = attempts[0].fov_range_rad.map(|rad| rad / RAD_PER_DEG);
+            assert!(low < 0.9 * fov_deg && high > 1.1 * fov_deg, "{low} {high}");
+        }
+        // Tycho-2 has no more stars for them.
+        let attempts = attempts(&of_fov(0.45), SIZE, &tycho2());
+        assert_eq!((attempts.len(), sweep_of(&attempts[0]).zone), (1, None));
+    }
+
+    #[test]
+    fn all_stars_of_a_small_part_of_the_sky_are_searched() {
+        let patch = contents(5000.0, 1e-4);
+        for priors in [Priors::default(), of_fov(0.2)] {
+            let attempts = attempts(&priors, SIZE, &patch);
+            assert_eq!(attempts.len(), 1);
+            let sweep = sweep_of(&attempts[0]);
+            assert_eq!((sweep.zone, sweep.per_sq_deg > 300.0), (None, true));
+            assert!(attempts[0].fov_range_rad[0] < 0.15 * RAD_PER_DEG);
+        }
     }
 
     #[test]
@@ -138,9 +277,12 @@ mod tests {
             mount: Some(near),
             ..of_fov(0.5)
         };
-        let of_mount = attempts(&by_mount, SIZE, TYCHO_RAD);
+        let of_mount = attempts(&by_mount, SIZE, &tycho2());
         assert_eq!(of_mount.len(), 2);
-        let region = of_mount[0].region.unwrap();
+        let Part::Near(region, place) = of_mount[0].part else {
+            panic!("{:?}", of_mount[0]);
+        };
+        assert_eq!(place, near);
         assert!(region.radius_rad > near.radius_rad);
         // Forty in 0.45° × 0.30°.
         assert!((region.per_sq_deg - 296.0).abs() < 1.0, "{region:?}");
@@ -148,6 +290,6 @@ mod tests {
             near: Some(near),
             ..of_fov(0.5)
         };
-        assert_eq!(attempts(&by_user, SIZE, TYCHO_RAD).len(), 1);
+        assert_eq!(attempts(&by_user, SIZE, &tycho2()).len(), 1);
     }
 }

@@ -1,8 +1,7 @@
 //! The search for a narrow field.
 
-use super::plan::{attempts, is_narrow};
+use super::plan::{Part, attempts, is_narrow};
 use super::sky::{DeepSky, Indexed};
-use crate::base::interrupt::Interrupt;
 use crate::base::size::Size;
 use crate::base::units::RAD_PER_DEG;
 use crate::catalog::deep::Region;
@@ -10,7 +9,7 @@ use crate::identify::diagnosis::Diagnosis;
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, Priors, ScalePrior, SearchFailure, SkyRegion,
 };
-use crate::solve::context::Context;
+use crate::solve::context::{Context, FrameLimits};
 use crate::solve::outcome::{Outcome, Reason};
 
 /// What an identification answers.
@@ -21,14 +20,74 @@ pub trait Answered {
     fn outcome_mut(&mut self) -> &mut Outcome;
 }
 
+/// What a frame shows: by which stars, and where.
+pub struct InAll<T> {
+    /// The answer.
+    pub answer: T,
+    /// The stars of the deep catalogue that are named.
+    pub named: Option<Indexed>,
+    /// The direction that was stated, where the frame shows another.
+    pub other_than: Option<SkyRegion>,
+}
+
 /// Identifies a frame of this size with the catalogue of all frames or with deep ones: with these first where the
-/// field is stated to be narrow. `identify` does so with the catalogue of a context and with priors. Also returns the
-/// stars of the deep one that are named.
+/// field is stated to be narrow. A direction that is stated is tried first, and dropped where nothing matches.
+/// `identify` identifies it with the catalogue of a context and with priors.
 pub fn identify_in_all<T: Answered>(
     (context, priors): (&Context, &Priors),
     size: Size,
-    interrupt: &Interrupt,
+    limits: &FrameLimits,
     mut identify: impl FnMut(&Context, &Priors) -> T,
+) -> InAll<T> {
+    let Some(near) = priors.near else {
+        let (answer, named) = search_all((context, priors), size, limits, &mut identify);
+        return InAll {
+            answer,
+            named,
+            other_than: None,
+        };
+    };
+    let there = context.unexplained();
+    let (answer, named) = search_all((&there, priors), size, limits, &mut identify);
+    if answer.outcome().identification().is_some() {
+        return InAll {
+            answer,
+            named,
+            other_than: None,
+        };
+    }
+    let anywhere = Priors {
+        near: None,
+        ..*priors
+    };
+    let (mut answer, named) = search_all((context, &anywhere), size, limits, &mut identify);
+    let other_than = match answer.outcome_mut() {
+        Outcome::Identified(found) => {
+            // Both searches gave chance an opportunity.
+            if !is_sure_after(found, 2.0) {
+                let best_log10_false_alarm = Some(found.log10_false_alarm);
+                let failure = SearchFailure::NoMatch {
+                    best_log10_false_alarm,
+                };
+                *answer.outcome_mut() = Outcome::NotIdentified(Reason::Search(failure));
+            }
+            Some(near)
+        }
+        Outcome::NotIdentified(_) => None,
+    };
+    InAll {
+        answer,
+        named,
+        other_than,
+    }
+}
+
+/// The same with these priors. Also returns the stars of the deep catalogue that are named.
+fn search_all<T: Answered>(
+    (context, priors): (&Context, &Priors),
+    size: Size,
+    limits: &FrameLimits,
+    identify: &mut impl FnMut(&Context, &Priors) -> T,
 ) -> (T, Option<Indexed>) {
     let Some(deep) = context.deep else {
         return (identify(context, priors), None);
@@ -38,10 +97,10 @@ pub fn identify_in_all<T: Answered>(
         context,
         priors,
         size,
-        interrupt,
+        limits,
     };
     let is_narrow = is_narrow(priors, size.width as f64);
-    if is_narrow && let Some((found, named)) = frame.search(&mut identify) {
+    if is_narrow && let Some((found, named)) = frame.search(identify) {
         return (found, Some(named));
     }
     let mut found = identify(context, priors);
@@ -50,7 +109,7 @@ pub fn identify_in_all<T: Answered>(
     }
     if !is_narrow
         && may_be_narrow(found.outcome())
-        && let Some((found, named)) = frame.search(&mut identify)
+        && let Some((found, named)) = frame.search(identify)
     {
         return (found, Some(named));
     }
@@ -74,7 +133,7 @@ struct DeepSearch<'a> {
     context: &'a Context<'a>,
     priors: &'a Priors,
     size: Size,
-    interrupt: &'a Interrupt,
+    limits: &'a FrameLimits,
 }
 
 impl DeepSearch<'_> {
@@ -86,15 +145,20 @@ impl DeepSearch<'_> {
         // The catalogue of all frames, first or later.
         let mut searches = 1.0;
         for number in 0..self.deep.catalogs().len() {
-            for attempt in attempts(self.priors, self.size, self.deep.narrowest_rad(number)) {
-                if self.interrupt.is_due() {
+            let contents = &self.deep.catalogs()[number].1;
+            for attempt in attempts(self.priors, self.size, contents) {
+                if self.limits.of_frame.is_due() {
                     return None;
                 }
-                let Some(indexed) = self.deep.indexed(number, &attempt, self.interrupt) else {
+                let Some(indexed) = self.deep.indexed(number, &attempt, self.limits) else {
                     continue;
                 };
+                let near = match attempt.part {
+                    Part::Near(_, near) => Some(near),
+                    Part::Sweep(_) => None,
+                };
                 let priors = Priors {
-                    near: attempt.near,
+                    near,
                     ..*self.priors
                 };
                 let mut found = identify(&self.context.over(&indexed), &priors);
@@ -151,9 +215,10 @@ impl DeepSearch<'_> {
         let (fov_rad, radius_rad) = (first.camera.fov_x_rad()?, first.camera.radius_rad());
         let region = region_around(first);
         let known = self.context.indexed.catalog();
+        let interrupt = &self.limits.of_frame;
         let indexed = self
             .deep
-            .around(number, region, fov_rad, known, self.interrupt)?;
+            .around(number, region, fov_rad, known, interrupt)?;
         let scale_rad = 1.0 / first.camera.central_focal_length_px();
         let priors = Priors {
             near: Some(SkyRegion {

@@ -1,32 +1,70 @@
 //! Deep catalogues, and the indexes of their stars.
 
 use super::around::merged;
-use super::plan::{Attempt, FIELDS_OF_SKY_RAD, MAX_STARS};
+use super::plan::{Attempt, Part, Sweep};
 use crate::base::interrupt::Interrupt;
-use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
-use crate::catalog::deep::{DeepCatalog, DeepContents, Region};
+use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
+use crate::catalog::deep::{DeepCatalog, DeepContents, Region, SkyZone};
 use crate::catalog::{Catalog, CatalogError};
 use crate::identify::{IndexedCatalog, MIN_STARS, SearchedPart};
+use crate::solve::context::FrameLimits;
 use std::collections::HashMap;
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Density of the stars of the whole sky that are indexed, where there are as many.
-const PER_SQ_DEG_OF_SKY: f64 = MAX_STARS / WHOLE_SKY_SQ_DEG;
-
 /// Version of the stars in the cache: it changes with what is read of catalogues, and with how stars are chosen.
-const STARS_VERSION: u32 = 1;
+const STARS_VERSION: u32 = 2;
 
-/// How far the index of the whole sky is built.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How far an index of the whole sky, or of a part, is built.
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum DeepProgress {
-    /// So many stars are to be indexed.
-    Stars(usize),
-    /// This share of the work is done.
+    /// The work begins: what it costs.
+    Begins(IndexingWork),
+    /// This share of a part is done.
     Share(f64),
-    /// It is done.
+    /// A part is done.
     Done,
+}
+
+/// What an index costs that is built when a frame first needs it, and kept. `Display` says so.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IndexingWork {
+    /// The catalogue.
+    pub catalog: String,
+    /// Stars that are indexed.
+    pub stars: f64,
+    /// The narrowest and the widest field, in radians.
+    pub fov_range_rad: [f64; 2],
+    /// Where it is kept; `None` where it is not.
+    pub cache_directory: Option<PathBuf>,
+}
+
+impl fmt::Display for IndexingWork {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        /// On two cores, from a fast disk.
+        const STARS_PER_MINUTE: f64 = 5e6;
+        const BYTES_PER_STAR: f64 = 120.0;
+        let [low_deg, high_deg] = self.fov_range_rad.map(|rad| rad * DEG_PER_RAD);
+        let minutes = (self.stars / STARS_PER_MINUTE).ceil();
+        write!(
+            f,
+            "indexing {:.1} million stars of {} for fields of {low_deg:.2}° to {high_deg:.2}°: about {minutes} minute{}",
+            self.stars / 1e6,
+            self.catalog,
+            if minutes > 1.0 { "s" } else { "" },
+        )?;
+        match &self.cache_directory {
+            Some(directory) => write!(
+                f,
+                " once, and {:.1} GB in {}",
+                self.stars * BYTES_PER_STAR / 1e9,
+                directory.display()
+            ),
+            None => f.write_str(" in each run: there is no directory to keep the index in"),
+        }
+    }
 }
 
 /// Tells how far the index of the whole sky is built.
@@ -39,8 +77,8 @@ pub struct DeepSky {
     catalogs: OnceLock<Vec<(DeepCatalog, DeepContents)>>,
     cache_directory: Option<PathBuf>,
     on_progress: Option<OnProgress>,
-    /// The indexes of the whole sky that were needed so far, by the number of the catalogue.
-    whole: Mutex<HashMap<usize, Arc<IndexedCatalog<'static>>>>,
+    /// The indexes of the whole sky that were needed so far, and the last of a part of it.
+    swept: Mutex<Swept>,
     errors: Mutex<Vec<CatalogError>>,
 }
 
@@ -52,6 +90,39 @@ enum Source {
 
 /// The stars of an attempt, or of what is around an answer.
 pub type Indexed = Arc<IndexedCatalog<'static>>;
+
+/// Indexes of catalogues, by the catalogue's number and the density of the stars.
+#[derive(Default)]
+struct Swept {
+    whole: HashMap<(usize, u64), Indexed>,
+    /// All parts would take too much memory.
+    part: Option<((usize, u64, SkyZone), Indexed)>,
+    /// Of which the cost was told.
+    told: Vec<(usize, u64)>,
+}
+
+impl Swept {
+    fn get(&self, number: usize, sweep: &Sweep) -> Option<Indexed> {
+        let density = sweep.per_sq_deg.to_bits();
+        match (sweep.zone, &self.part) {
+            (None, _) => self.whole.get(&(number, density)).cloned(),
+            (Some(zone), Some((key, indexed))) if *key == (number, density, zone) => {
+                Some(indexed.clone())
+            }
+            (Some(_), _) => None,
+        }
+    }
+
+    fn put(&mut self, number: usize, sweep: &Sweep, indexed: Indexed) {
+        let density = sweep.per_sq_deg.to_bits();
+        match sweep.zone {
+            None => {
+                self.whole.insert((number, density), indexed);
+            }
+            Some(zone) => self.part = Some(((number, density, zone), indexed)),
+        }
+    }
+}
 
 impl DeepSky {
     /// These catalogues. The indexes of the whole sky are kept in a directory, if one is given.
@@ -71,7 +142,7 @@ impl DeepSky {
             catalogs: OnceLock::new(),
             cache_directory,
             on_progress: None,
-            whole: Mutex::default(),
+            swept: Mutex::default(),
             errors: Mutex::default(),
         }
     }
@@ -119,20 +190,16 @@ impl DeepSky {
         self.errors.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The narrowest field of a catalogue, in radians.
-    pub(super) fn narrowest_rad(&self, number: usize) -> f64 {
-        self.catalogs()[number].1.narrowest_fov_deg() * RAD_PER_DEG
-    }
-
     /// The stars of an attempt in a catalogue, indexed; `None` where they cannot be had.
     pub(super) fn indexed(
         &self,
         number: usize,
         attempt: &Attempt,
-        interrupt: &Interrupt,
+        limits: &FrameLimits,
     ) -> Option<Indexed> {
-        match attempt.region {
-            Some(region) => {
+        match attempt.part {
+            Part::Near(region, _) => {
+                let interrupt = &limits.of_frame;
                 let stars = self.catalogs()[number].0.stars_in(region, interrupt);
                 let title = self.title(number);
                 let catalog = stars.and_then(|stars| Catalog::new(title, stars, Vec::new()));
@@ -148,7 +215,9 @@ impl DeepSky {
                     .ok()
                     .map(Arc::new)
             }
-            None => self.whole_sky(number, interrupt),
+            Part::Sweep(sweep) => limits
+                .paused
+                .during(|| self.swept(number, sweep, attempt.fov_range_rad, &limits.of_all)),
         }
     }
 
@@ -184,35 +253,123 @@ impl DeepSky {
         made.map_err(|error| self.errors().push(error)).ok()
     }
 
-    /// The index of the whole sky, made when it is first needed.
-    fn whole_sky(&self, number: usize, interrupt: &Interrupt) -> Option<Indexed> {
-        let mut whole = self.whole.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = whole.get(&number) {
-            return Some(known.clone());
+    /// The index of the whole sky or of a part, made when it is first needed.
+    fn swept(
+        &self,
+        number: usize,
+        sweep: Sweep,
+        fov_range_rad: [f64; 2],
+        interrupt: &Interrupt,
+    ) -> Option<Indexed> {
+        let mut swept = self.swept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = swept.get(number, &sweep) {
+            return Some(known);
         }
+        let key = (number, sweep.per_sq_deg.to_bits());
+        let is_told = swept.told.contains(&key);
+        let making = Making {
+            number,
+            sweep,
+            fov_range_rad,
+            interrupt,
+        };
         // On a thread of its own: one of a pool that waits for parts of its work may begin another frame, which
         // would wait for this lock.
         let made = std::thread::scope(|scope| {
-            let making = scope.spawn(|| self.make_whole_sky(number, interrupt));
+            let making = scope.spawn(|| self.make(&making, is_told));
             making.join().ok().flatten()
         });
-        let made = Arc::new(made?);
-        whole.insert(number, made.clone());
+        let (made, tells) = made?;
+        if tells {
+            swept.told.push(key);
+        }
+        swept.put(number, &sweep, made.clone());
         Some(made)
     }
 
-    /// The stars of a region, from the cache if they are there: to choose them takes longer than to read them.
-    fn stars_of(&self, number: usize, region: Region, interrupt: &Interrupt) -> Option<Catalog> {
-        let deep = &self.catalogs()[number].0;
-        let name = format!("stars-{:016x}-v{STARS_VERSION}.cat", deep.fingerprint());
-        let path = self
-            .cache_directory
-            .as_ref()
-            .map(|directory| directory.join(name));
-        if let Some(kept) = path.as_deref().and_then(|path| Catalog::read(path).ok()) {
-            return Some(kept);
+    /// Makes an index, or reads it from the cache. Also returns whether its cost was told.
+    fn make(&self, making: &Making, is_told: bool) -> Option<(Indexed, bool)> {
+        let tell = |progress: DeepProgress| {
+            if let Some(on_progress) = &self.on_progress {
+                on_progress(progress);
+            }
+        };
+        let path = self.path_of_stars(making);
+        let kept = path.as_deref().and_then(|path| Catalog::read(path).ok());
+        let tells = kept.is_none() && !is_told;
+        let catalog = match kept {
+            Some(kept) => kept,
+            None => {
+                if tells {
+                    tell(DeepProgress::Begins(self.work(making)));
+                }
+                self.stars_of(making, path)?
+            }
+        };
+        if catalog.stars().len() < MIN_STARS {
+            return None;
         }
-        let stars = self.kept(deep.stars_in(region, interrupt))?;
+        let area_sq_deg = Region::WHOLE_SKY.area_sq_deg();
+        let zones = f64::from(making.sweep.zone.map_or(1, |_| SkyZone::COUNT));
+        let part = SearchedPart {
+            area_sq_deg: area_sq_deg / zones,
+            fov_range_rad: making.fov_range_rad,
+        };
+        let made = IndexedCatalog::of_part(
+            Arc::new(catalog),
+            part,
+            self.cache_directory.as_deref(),
+            &|share| tell(DeepProgress::Share(share)),
+            making.interrupt,
+        );
+        tell(DeepProgress::Done);
+        Some((Arc::new(made.ok()?), tells))
+    }
+
+    fn work(&self, making: &Making) -> IndexingWork {
+        IndexingWork {
+            catalog: self.title(making.number),
+            stars: making.sweep.stars,
+            fov_range_rad: making.fov_range_rad,
+            cache_directory: self.cache_directory.clone(),
+        }
+    }
+
+    /// The file of the cache for the stars: to choose them takes longer than to read them.
+    fn path_of_stars(&self, making: &Making) -> Option<PathBuf> {
+        let directory = self.cache_directory.as_ref()?;
+        let fingerprint = self.catalogs()[making.number].0.fingerprint();
+        let density = making.sweep.per_sq_deg.round();
+        let zone = making
+            .sweep
+            .zone
+            .map(|zone| format!("-{:02}", zone.number()));
+        let zone = zone.unwrap_or_default();
+        let name = format!("stars-{fingerprint:016x}-{density}{zone}-v{STARS_VERSION}.cat");
+        Some(directory.join(name))
+    }
+
+    /// Chooses the stars, and keeps them in a file.
+    fn stars_of(&self, making: &Making, path: Option<PathBuf>) -> Option<Catalog> {
+        /// Fields that reach beyond a part have their stars in it.
+        const MARGIN_RAD: f64 = 0.5 * RAD_PER_DEG;
+        let (number, per_sq_deg) = (making.number, making.sweep.per_sq_deg);
+        let deep = &self.catalogs()[number].0;
+        let region = match making.sweep.zone {
+            None => Region {
+                per_sq_deg,
+                ..Region::WHOLE_SKY
+            },
+            Some(zone) => Region {
+                centre: zone.centre(),
+                radius_rad: SkyZone::RADIUS_RAD + MARGIN_RAD,
+                per_sq_deg,
+            },
+        };
+        let mut stars = self.kept(deep.stars_in(region, making.interrupt))?;
+        if let Some(zone) = making.sweep.zone {
+            stars.retain(|star| zone.contains(&star.direction, MARGIN_RAD));
+        }
         let catalog = self.kept(Catalog::new(self.title(number), stars, Vec::new()))?;
         if let Some(path) = path {
             // Without it the next process takes longer. The index beside it tells why it cannot be kept.
@@ -221,35 +378,13 @@ impl DeepSky {
         }
         Some(catalog)
     }
+}
 
-    fn make_whole_sky(
-        &self,
-        number: usize,
-        interrupt: &Interrupt,
-    ) -> Option<IndexedCatalog<'static>> {
-        let tell = |progress: DeepProgress| {
-            if let Some(on_progress) = &self.on_progress {
-                on_progress(progress);
-            }
-        };
-        let whole_sky = Region {
-            per_sq_deg: PER_SQ_DEG_OF_SKY,
-            ..Region::WHOLE_SKY
-        };
-        let catalog = self.stars_of(number, whole_sky, interrupt)?;
-        tell(DeepProgress::Stars(catalog.stars().len()));
-        let part = SearchedPart {
-            area_sq_deg: whole_sky.area_sq_deg(),
-            fov_range_rad: FIELDS_OF_SKY_RAD,
-        };
-        let made = IndexedCatalog::of_part(
-            Arc::new(catalog),
-            part,
-            self.cache_directory.as_deref(),
-            &|share| tell(DeepProgress::Share(share)),
-            interrupt,
-        );
-        tell(DeepProgress::Done);
-        made.ok()
-    }
+/// An index that is to be made.
+struct Making<'a> {
+    /// The catalogue.
+    number: usize,
+    sweep: Sweep,
+    fov_range_rad: [f64; 2],
+    interrupt: &'a Interrupt,
 }

@@ -51,7 +51,7 @@ impl<'a> MagnitudeColumns<'a> {
             Self::Tycho(bt, vt) => johnson(bt.and_then(mag), vt.and_then(mag)),
             Self::Gaia(g, colors) => {
                 let color = colors.and_then(|[bp, rp]| Some(mag(bp)? - mag(rp)?));
-                Some((gaia::johnson_v(mag(g)?, color), None))
+                Some(gaia::johnson(mag(g)?, color))
             }
             Self::TwoMass(j) => Some((rounded_mag(mag(j)? + V_MINUS_J_MAG), None)),
             Self::Other(other) => Some((rounded_mag(mag(other)?), None)),
