@@ -18,7 +18,7 @@ mod region;
 mod stored;
 
 pub use error::Damage;
-pub use installed::installed_paths;
+pub use installed::{installed_paths, installed_paths_below};
 pub use region::Region;
 
 use super::folder::files_in;
