@@ -4,6 +4,7 @@
 //! Each target is a function of bytes. `cargo fuzz run TARGET` looks for bytes that break it;
 //! the tests of starpipe replay those in `corpus/` and changes of them.
 
+mod deep;
 mod frames;
 mod pipeline;
 mod scratch;
@@ -24,6 +25,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("exif", frames::exif),
     ("pages", frames::pages),
     ("catalog", tables::catalog),
+    ("deep", deep::deep),
     ("compact", tables::compact),
     ("index", tables::index),
     ("camera", tables::camera),

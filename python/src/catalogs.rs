@@ -3,16 +3,21 @@
 use crate::errors::{exception, message, warn};
 use pyo3::prelude::*;
 use starpipe::Interrupt;
+use starpipe::catalog::deep::{DeepCatalog, installed_paths_below};
 use starpipe::catalog::{self, Catalog};
 use starpipe::identify::{IndexedCatalog, cache_directory};
+use starpipe::solve::DeepSky;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// The file of a catalogue, `None` for the built-in one, and the directory of its index.
 type Key = (Option<PathBuf>, Option<PathBuf>);
+/// The files and folders of deep catalogues, and the directory of their indexes.
+type DeepKey = (Vec<PathBuf>, Option<PathBuf>);
 
 static CATALOGS: Mutex<Option<HashMap<Key, &'static IndexedCatalog<'static>>>> = Mutex::new(None);
+static DEEP: Mutex<Option<HashMap<DeepKey, &'static DeepSky>>> = Mutex::new(None);
 
 /// The catalogue with its index. It is kept to the end of the process: pipelines, copies and
 /// threads share it.
@@ -49,6 +54,26 @@ pub fn open(key: Key, interrupt: &Interrupt) -> PyResult<&'static IndexedCatalog
     let indexed: &'static IndexedCatalog = Box::leak(Box::new(indexed));
     catalogs.insert(key, indexed);
     Ok(indexed)
+}
+
+/// The deep catalogues for narrow fields: those in the stated file or folder, none if it has another catalogue; if none
+/// is stated, those that are installed, by packages of Python below `prefix`, too.
+pub fn deep(key: &Key, prefix: &Path) -> PyResult<Option<&'static DeepSky>> {
+    let cache = key.1.clone().or_else(cache_directory);
+    let (paths, made) = match &key.0 {
+        Some(path) => match DeepCatalog::find(path).map_err(exception)? {
+            found if found.is_empty() => return Ok(None),
+            found => (vec![path.clone()], DeepSky::new(found, cache.clone())),
+        },
+        None => match installed_paths_below(prefix) {
+            paths if paths.is_empty() => return Ok(None),
+            paths => (paths.clone(), DeepSky::installed(paths, cache.clone())),
+        },
+    };
+    let mut known = DEEP.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = known.get_or_insert_default().entry((paths, cache));
+    let kept: &'static DeepSky = *known.or_insert_with(|| &*Box::leak(Box::new(made)));
+    Ok(Some(kept))
 }
 
 /// The catalogue in a file, or the built-in one.

@@ -2,7 +2,7 @@
 
 use crate::camera::description;
 use crate::catalogs;
-use crate::errors::exception;
+use crate::errors::{exception, message, warn};
 use crate::input::{Borrowed, Failed, Input};
 use crate::interrupt::{on_this_thread, on_threads, useful};
 use crate::options::Options;
@@ -14,7 +14,7 @@ use starpipe::centroids::{CentroidList, ListedCentroid};
 use starpipe::detect::DetectError;
 use starpipe::frame::{Buffers, RowOrder};
 use starpipe::photometry::instrumental_mag;
-use starpipe::solve::{self, solve_centroids, solve_frame, solve_guarded, solve_read};
+use starpipe::solve::{self, DeepSky, solve_centroids, solve_frame, solve_guarded, solve_read};
 use starpipe::{Context, DetectConfig, IndexedCatalog, Interrupt, PixelPoint, Solution, Workspace};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,8 @@ use std::sync::Mutex;
 #[pyclass(frozen, module = "starpipe._starpipe")]
 pub struct Pipeline {
     pub indexed: &'static IndexedCatalog<'static>,
+    /// For fields that the catalogue is too sparse for.
+    deep: Option<&'static DeepSky>,
     camera: Option<CameraDescription>,
     /// Buffers that no thread uses at present.
     workspaces: Mutex<Vec<Workspace>>,
@@ -40,9 +42,16 @@ impl Pipeline {
         cache_dir: Option<PathBuf>,
     ) -> PyResult<Self> {
         let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        let prefix: PathBuf = py.import("sys")?.getattr("prefix")?.extract()?;
         on_threads(py, all, |interrupt| {
+            let stated = (catalog, cache_dir);
+            let deep = catalogs::deep(&stated, &prefix)?;
+            let (catalog, cache_dir) = stated;
+            // Deep ones are used beside the built-in one.
+            let catalog = catalog.filter(|_| deep.is_none());
             Ok(Self {
                 indexed: catalogs::open((catalog, cache_dir), interrupt)?,
+                deep,
                 camera: camera.as_deref().map(description).transpose()?,
                 workspaces: Mutex::default(),
             })
@@ -69,6 +78,7 @@ impl Pipeline {
         let input = frame.borrow()?;
         let mut context = self.context(&options)?;
         context.as_stored = !as_drawn;
+        context.deep = self.deep;
         let work = |interrupt: &Interrupt| {
             let name = input.name.clone();
             let mut workspace = self.workspace(threads, interrupt);
@@ -118,7 +128,8 @@ impl Pipeline {
             has_brightness: brightness.is_some(),
             centroids: rows.iter().enumerate().map(centroid).collect(),
         };
-        let context = self.context(&options)?;
+        let mut context = self.context(&options)?;
+        context.deep = self.deep;
         on_this_thread(py, |interrupt| {
             let name = Path::new("centroids");
             let mut workspace = self.workspace(NonZeroUsize::MIN, interrupt);
@@ -154,7 +165,11 @@ impl Pipeline {
         }
     }
 
+    /// A solved frame; errors of deep catalogues are told.
     fn solved(&self, name: &Path, solution: Solution, row_order: Option<RowOrder>) -> Solved {
+        for error in self.deep.map(DeepSky::take_errors).unwrap_or_default() {
+            warn(&format!("{}; it was not used", message(&error)));
+        }
         Solved {
             name: name.display().to_string(),
             solution,

@@ -33,7 +33,9 @@ class Pipeline:
     ----------
     catalog : path, optional
         A star catalog instead of the built-in one: SKY2000, Tycho-2, a table, or a file written
-        by ``starpipe catalog import``.
+        by ``starpipe catalog import``. Or one for narrow fields, which is used beside the built-in
+        one: index files of astrometry.net, or a database of ASTAP. If none is given, those that
+        are installed are used, such as the package ``starpipe-tycho2``.
     camera : path or str, optional
         A description of the camera (TOML), or the name of a preset. It gives the scale if no
         option does, and a predicted limiting magnitude.

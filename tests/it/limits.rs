@@ -2,7 +2,7 @@
 
 #![cfg(unix)]
 
-use crate::common::{Ran, fits_header, orion, starpipe};
+use crate::common::{Ran, fits_header, measured, orion, starpipe};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use std::fs;
@@ -90,28 +90,6 @@ fn a_color_profile_that_grows_without_end_is_not_unpacked() {
     command.env("STARPIPE_CATALOGS", "");
     let (_, peak_kb) = measured(command.arg("process").arg(&path));
     assert!(peak_kb < 300_000, "{peak_kb} kB");
-}
-
-/// Exit status and largest memory in kB of a command.
-fn measured(command: &mut Command) -> (Option<i32>, u64) {
-    let mut child = command
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    let status = format!("/proc/{}/status", child.id());
-    let mut peak_kb = 0;
-    loop {
-        // The high-water mark, as long as the process is there.
-        let text = fs::read_to_string(&status).unwrap_or_default();
-        let peak = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        let kb = peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse().ok());
-        peak_kb = peak_kb.max(kb.unwrap_or(0));
-        if let Some(done) = child.try_wait().unwrap() {
-            return (done.code(), peak_kb);
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
 }
 
 #[test]

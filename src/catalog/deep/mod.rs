@@ -22,7 +22,7 @@ mod tables;
 
 pub use error::Damage;
 pub(crate) use healpix::SkyZone;
-pub use installed::installed_paths;
+pub use installed::{installed_paths, installed_paths_below};
 pub use region::Region;
 
 use super::folder::files_in;

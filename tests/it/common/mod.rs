@@ -51,6 +51,32 @@ pub fn starpipe() -> Command {
     command
 }
 
+/// Exit status and largest memory in kB of a command.
+///
+/// # Panics
+/// If it cannot be started.
+#[cfg(unix)]
+pub fn measured(command: &mut std::process::Command) -> (Option<i32>, u64) {
+    let mut child = command
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak_kb = 0;
+    loop {
+        // The high-water mark, as long as the process is there.
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let peak = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kb = peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse().ok());
+        peak_kb = peak_kb.max(kb.unwrap_or(0));
+        if let Some(done) = child.try_wait().unwrap() {
+            return (done.code(), peak_kb);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
 /// The built-in catalogue and its index, built once.
 pub fn sky() -> &'static IndexedCatalog<'static> {
     static SKY: OnceLock<IndexedCatalog> = OnceLock::new();

@@ -17,6 +17,7 @@ use starpipe::{
     CameraModel, CentroidList, Context, Priors, ScalePrior, Workspace, solve_centroids,
 };
 use std::f64::consts::TAU;
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 
@@ -131,6 +132,26 @@ fn assert_fields(path: &Path, patch: &Patch) {
     assert!(identified + 1 >= FIELDS, "{identified} of {FIELDS}");
 }
 
+/// Draws a frame of 0.4° as a list in a folder; what the program is to be told to identify it.
+pub fn identify_drawn(patch: &Patch, folder: &Path) -> Vec<OsString> {
+    const FOV_DEG: f64 = 0.4;
+    let field = field(patch, FOV_DEG, &mut ChaCha8Rng::seed_from_u64(7));
+    let rows = field.list.centroids.iter().map(|centroid| {
+        let place = centroid.position;
+        format!("{},{},{}\n", place.x, place.y, centroid.mag)
+    });
+    let list = folder.join("list.csv");
+    fs::write(&list, format!("x,y,mag\n{}", rows.collect::<String>())).unwrap();
+    let (ra_rad, dec_rad) = patch.centre.to_ra_dec();
+    let (ra_deg, dec_deg) = (ra_rad / RAD_PER_DEG, dec_rad / RAD_PER_DEG);
+    let [width, height] = SIZE;
+    let stated = format!(
+        "identify --format json --fov {FOV_DEG} --width {width} --height {height} --near {ra_deg},{dec_deg} --radius 3"
+    );
+    let stated = stated.split(' ').map(OsString::from);
+    stated.chain([list.into_os_string()]).collect()
+}
+
 /// The program names the catalogue that it used, and says how many stars it expects where there are too few.
 #[test]
 fn the_report_names_the_catalogue_that_was_used() {
@@ -138,29 +159,15 @@ fn the_report_names_the_catalogue_that_was_used() {
     let folder = tempfile::tempdir().unwrap();
     let index = folder.path().join("index.fits");
     fs::write(&index, index_file(&patch.stars, Series::Gaia, false)).unwrap();
-    let field = field(&patch, 0.4, &mut ChaCha8Rng::seed_from_u64(7));
-    let rows = field.list.centroids.iter().map(|centroid| {
-        let place = centroid.position;
-        format!("{},{},{}\n", place.x, place.y, centroid.mag)
-    });
-    let list = folder.path().join("list.csv");
-    fs::write(&list, format!("x,y,mag\n{}", rows.collect::<String>())).unwrap();
-    let mut identify = starpipe();
-    let [width, height] = SIZE.map(|side| side.to_string());
-    identify.args([
-        "identify", "--format", "json", "--fov", "0.4", "--width", &width,
-    ]);
-    let (ra_rad, dec_rad) = patch.centre.to_ra_dec();
-    let near = format!("{},{}", ra_rad / RAD_PER_DEG, dec_rad / RAD_PER_DEG);
-    identify.args(["--height", &height, "--near", &near, "--radius", "3"]);
-    let ran = Ran::new(identify.arg(&list));
+    let arguments = identify_drawn(&patch, folder.path());
+    let ran = Ran::new(starpipe().args(&arguments));
     assert!(
         ran.stdout
             .contains("too narrow for the catalog: 1 star is expected"),
         "{}",
         ran.stdout
     );
-    let ran = Ran::new(identify.arg("--catalog").arg(&index));
+    let ran = Ran::new(starpipe().args(&arguments).arg("--catalog").arg(&index));
     assert_eq!(ran.status, 0, "{}", ran.stdout);
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
     let catalog = report["match"]["catalog"].as_str().unwrap();

@@ -2,6 +2,7 @@
 
 use super::patch::DrawnStar;
 use crate::common::fits_header;
+use std::io::{Cursor, Seek, SeekFrom, Write};
 
 /// Stars of a leaf of the tree, at most.
 const LEAF: usize = 25;
@@ -19,21 +20,46 @@ pub enum Series {
 
 /// An index file with these stars; numbers are stored as on a machine of this byte order.
 pub fn index_file(stars: &[DrawnStar], series: Series, big_endian: bool) -> Vec<u8> {
-    let levels = (stars.len() as f64 / LEAF as f64).log2().ceil().max(1.0) as u32;
-    let mut tree = Tree {
-        stars,
-        splits: vec![0; (1 << levels) - 1],
-        ends: vec![0; 1 << levels],
-    };
-    let mut order: Vec<usize> = (0..stars.len()).collect();
-    tree.divide(0, &mut order, 0);
-    tree.file(&order, series, big_endian)
+    let mut file = Cursor::new(Vec::new());
+    write(&mut file, Tree::new(stars), series, big_endian);
+    file.into_inner()
+}
+
+/// Writes an index file whose tree has `before` rows with y < 0, which are holes, and then these stars, of y > 0.
+pub fn write_sparse(file: impl Write + Seek, stars: &[DrawnStar], before: u32, series: Series) {
+    let (mut tree, order) = Tree::new(stars);
+    tree.add_holes(before);
+    write(file, (tree, order), series, false);
+}
+
+fn write(
+    mut file: impl Write + Seek,
+    (tree, order): (Tree, Vec<usize>),
+    series: Series,
+    big_endian: bool,
+) {
+    let primary = [
+        "SIMPLE  =                    T",
+        "BITPIX  =                    8",
+        "NAXIS   =                    0",
+        endian(big_endian),
+        "AN_FILE = 'QUAD    '",
+        "SCALE_U =     0.00087266462599",
+        "HEALPIX =                   -1",
+        "HPNSIDE =                    0",
+    ];
+    file.write_all(&fits_header(&cards(&primary))).unwrap();
+    for table in tree.tables(&order, series, big_endian) {
+        table.write(&mut file);
+    }
 }
 
 struct Tree<'a> {
     stars: &'a [DrawnStar],
     splits: Vec<u32>,
     ends: Vec<u32>,
+    /// Rows before the stars.
+    before: u32,
 }
 
 /// A coordinate as it is stored.
@@ -43,7 +69,21 @@ fn steps(coordinate: f64) -> u32 {
 
 const SCALE: f64 = u32::MAX as f64 / 2.0;
 
-impl Tree<'_> {
+impl<'a> Tree<'a> {
+    /// The tree of some stars, and their order in it.
+    fn new(stars: &'a [DrawnStar]) -> (Self, Vec<usize>) {
+        let levels = (stars.len() as f64 / LEAF as f64).log2().ceil().max(1.0) as u32;
+        let mut tree = Self {
+            stars,
+            splits: vec![0; (1 << levels) - 1],
+            ends: vec![0; 1 << levels],
+            before: 0,
+        };
+        let mut order: Vec<usize> = (0..stars.len()).collect();
+        tree.divide(0, &mut order, 0);
+        (tree, order)
+    }
+
     fn divide(&mut self, node: usize, stars: &mut [usize], before: usize) {
         if node >= self.splits.len() {
             let leaf = node - self.splits.len();
@@ -69,7 +109,26 @@ impl Tree<'_> {
         self.divide(2 * node + 2, right, before + middle);
     }
 
-    fn file(&self, order: &[usize], series: Series, big_endian: bool) -> Vec<u8> {
+    /// Adds another tree on the other side of y = 0, whose leaves have rows before the stars.
+    fn add_holes(&mut self, before: u32) {
+        const ALONG_Y: u32 = 1;
+        let mut splits = vec![steps(0.0) & !3 | ALONG_Y];
+        let (mut from, mut width) = (0, 1);
+        while from < self.splits.len() {
+            splits.extend(vec![0; width]);
+            splits.extend(&self.splits[from..from + width]);
+            from += width;
+            width *= 2;
+        }
+        let leaves = self.ends.len() as u64;
+        let end = |leaf: u64| (u64::from(before) * leaf / leaves) as u32 - 1;
+        let ends = self.ends.iter().map(|end| before + end);
+        self.ends = (1..=leaves).map(end).chain(ends).collect();
+        self.splits = splits;
+        self.before = before;
+    }
+
+    fn tables(&self, order: &[usize], series: Series, big_endian: bool) -> Vec<Table> {
         let u32_of = |number: u32| match big_endian {
             true => number.to_be_bytes(),
             false => number.to_le_bytes(),
@@ -79,64 +138,56 @@ impl Tree<'_> {
             false => number.to_le_bytes(),
         };
         let stars: Vec<DrawnStar> = order.iter().map(|star| self.stars[*star]).collect();
-        let endian = match big_endian {
-            true => "ENDIAN  = '01:02:03:04'",
-            false => "ENDIAN  = '04:03:02:01'",
-        };
-        let mut file = fits_header(&cards(&[
-            "SIMPLE  =                    T",
-            "BITPIX  =                    8",
-            "NAXIS   =                    0",
-            endian,
-            "AN_FILE = 'QUAD    '",
-            "SCALE_U =     0.00087266462599",
-            "HEALPIX =                   -1",
-            "HPNSIDE =                    0",
-        ]));
+        let endian = endian(big_endian);
         let trees = [
             "AN_FILE = 'SKDT    '",
             endian,
             "KDT_NDIM=                    3",
             "KDT_DATA= 'u32     '",
         ];
-        file.extend(table("kdtree_header_stars", 0, &[], &trees));
         let ends: Vec<u8> = self.ends.iter().flat_map(|end| u32_of(*end)).collect();
-        file.extend(table("kdtree_lr_stars", 4, &ends, &[]));
         let splits: Vec<u8> = self
             .splits
             .iter()
             .flat_map(|split| u32_of(*split))
             .collect();
-        file.extend(table("kdtree_split_stars", 4, &splits, &[]));
         let range = [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0, SCALE];
         let range: Vec<u8> = range.into_iter().flat_map(f64_of).collect();
-        file.extend(table("kdtree_range_stars", 8, &range, &[]));
         let vectors = stars
             .iter()
             .flat_map(|star| <[f64; 3]>::from(*star.direction.as_vector()));
         let vectors: Vec<u8> = vectors.flat_map(|value| u32_of(steps(value))).collect();
-        file.extend(table("kdtree_data_stars", 12, &vectors, &[]));
-        file.extend(self.beside(order, &stars, series));
-        file
+        vec![
+            table("kdtree_header_stars", 0, vec![], &trees),
+            table("kdtree_lr_stars", 4, ends, &[]),
+            table("kdtree_split_stars", 4, splits, &[]),
+            table("kdtree_range_stars", 8, range, &[]),
+            table("kdtree_data_stars", 12, vectors, &[]).after(self.before),
+            self.beside(order, &stars, series).after(self.before),
+        ]
     }
 
-    /// The tables of brightness.
-    fn beside(&self, order: &[usize], stars: &[DrawnStar], series: Series) -> Vec<u8> {
+    /// The table of brightness.
+    fn beside(&self, order: &[usize], stars: &[DrawnStar], series: Series) -> Table {
         let tag = |columns: &[(&str, f64)]| {
-            let mut more = vec![
+            let mut cards = vec![
                 "AN_FILE = 'TAGALONG'".to_owned(),
                 format!("TFIELDS = {:20}", columns.len()),
             ];
             for (number, (name, _)) in columns.iter().enumerate() {
-                more.push(format!("TFORM{}  = '1E      '", number + 1));
-                more.push(format!("TTYPE{}  = '{name}'", number + 1));
+                cards.push(format!("TFORM{}  = '1E      '", number + 1));
+                cards.push(format!("TTYPE{}  = '{name}'", number + 1));
             }
             let rows = stars.iter().flat_map(|star| {
                 let magnitudes = columns.iter().map(|(_, less)| (star.v_mag - less) as f32);
                 magnitudes.flat_map(f32::to_be_bytes)
             });
-            let rows: Vec<u8> = rows.collect();
-            raw_table(4 * columns.len(), &rows, &more)
+            Table {
+                row_bytes: 4 * columns.len(),
+                before: 0,
+                data: rows.collect(),
+                cards,
+            }
         };
         match series {
             // B−V of 0.45.
@@ -150,10 +201,18 @@ impl Tree<'_> {
             Series::Lite => {
                 // The stars are drawn brightest first.
                 let rank = |star: &usize| (256 * star / self.stars.len()) as u8;
-                let ranks: Vec<u8> = order.iter().map(rank).collect();
-                table("sweep", 1, &ranks, &["TFORM1  = '1B      '"])
+                let ranks = order.iter().map(rank).collect();
+                table("sweep", 1, ranks, &["TFORM1  = '1B      '"])
             }
         }
+    }
+}
+
+/// The card of the order of bytes.
+fn endian(big_endian: bool) -> &'static str {
+    match big_endian {
+        true => "ENDIAN  = '01:02:03:04'",
+        false => "ENDIAN  = '04:03:02:01'",
     }
 }
 
@@ -161,31 +220,62 @@ fn cards(cards: &[&str]) -> Vec<String> {
     cards.iter().map(|card| (*card).to_owned()).collect()
 }
 
-/// A table with one column of bytes.
-fn table(name: &str, row_bytes: usize, data: &[u8], more: &[&str]) -> Vec<u8> {
-    let mut more = cards(more);
-    more.push("TFIELDS =                    1".to_owned());
-    if !more.iter().any(|card| card.starts_with("TFORM1")) {
-        more.push(format!("TFORM1  = '{row_bytes}A'"));
-    }
-    more.push(format!("TTYPE1  = '{name}'"));
-    raw_table(row_bytes, data, &more)
+/// A table of a file.
+struct Table {
+    /// Bytes of a row.
+    row_bytes: usize,
+    /// Rows before those of `data`, which are holes.
+    before: u32,
+    data: Vec<u8>,
+    /// Its cards, besides those of its size.
+    cards: Vec<String>,
 }
 
-fn raw_table(row_bytes: usize, data: &[u8], more: &[String]) -> Vec<u8> {
-    let rows = data.len().checked_div(row_bytes).unwrap_or(0);
-    let mut header = cards(&[
-        "XTENSION= 'BINTABLE'",
-        "BITPIX  =                    8",
-        "NAXIS   =                    2",
-    ]);
-    header.push(format!("NAXIS1  = {row_bytes:20}"));
-    header.push(format!("NAXIS2  = {rows:20}"));
-    header.push("PCOUNT  =                    0".to_owned());
-    header.push("GCOUNT  =                    1".to_owned());
-    header.extend(more.iter().cloned());
-    let mut bytes = fits_header(&header);
-    bytes.extend(data);
-    bytes.resize(bytes.len().next_multiple_of(2880), 0);
-    bytes
+impl Table {
+    fn after(self, before: u32) -> Self {
+        Self { before, ..self }
+    }
+
+    fn header(&self) -> Vec<u8> {
+        let rows = self.data.len().checked_div(self.row_bytes).unwrap_or(0);
+        let rows = rows + self.before as usize;
+        let mut header = cards(&[
+            "XTENSION= 'BINTABLE'",
+            "BITPIX  =                    8",
+            "NAXIS   =                    2",
+        ]);
+        header.push(format!("NAXIS1  = {:20}", self.row_bytes));
+        header.push(format!("NAXIS2  = {rows:20}"));
+        header.push("PCOUNT  =                    0".to_owned());
+        header.push("GCOUNT  =                    1".to_owned());
+        header.extend(self.cards.iter().cloned());
+        fits_header(&header)
+    }
+
+    fn write(&self, mut file: impl Write + Seek) {
+        file.write_all(&self.header()).unwrap();
+        let before = u64::from(self.before) * self.row_bytes as u64;
+        let start = file.stream_position().unwrap();
+        file.seek(SeekFrom::Start(start + before)).unwrap();
+        file.write_all(&self.data).unwrap();
+        let end = file.stream_position().unwrap();
+        let rest = end.next_multiple_of(2880) - end;
+        file.write_all(&vec![0; rest as usize]).unwrap();
+    }
+}
+
+/// A table with one column of bytes.
+fn table(name: &str, row_bytes: usize, data: Vec<u8>, more: &[&str]) -> Table {
+    let mut cards = cards(more);
+    cards.push("TFIELDS =                    1".to_owned());
+    if !cards.iter().any(|card| card.starts_with("TFORM1")) {
+        cards.push(format!("TFORM1  = '{row_bytes}A'"));
+    }
+    cards.push(format!("TTYPE1  = '{name}'"));
+    Table {
+        row_bytes,
+        before: 0,
+        data,
+        cards,
+    }
 }

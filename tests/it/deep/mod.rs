@@ -6,3 +6,5 @@ mod fields;
 mod index_file;
 mod patch;
 mod reading;
+#[cfg(target_os = "linux")]
+mod sparse;

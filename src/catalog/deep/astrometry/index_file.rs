@@ -41,6 +41,24 @@ struct CoveredCell {
     side: u32,
 }
 
+impl CoveredCell {
+    /// The cell with a number, where each of the twelve faces is divided into `side` × `side`.
+    fn new(number: i64, side: u32) -> Result<Self, Damage> {
+        /// More than any file has, and few enough to number all cells.
+        const MAX_SIDE: u32 = 1 << 14;
+        let cells = u64::from(side) * u64::from(side) * 12;
+        match u32::try_from(number) {
+            Ok(number) if side <= MAX_SIDE && u64::from(number) < cells => {
+                Ok(Self { number, side })
+            }
+            _ => {
+                let message = format!("HEALPIX = {number} with HPNSIDE = {side}");
+                Err(Damage::Invalid(message))
+            }
+        }
+    }
+}
+
 impl IndexFile {
     /// Whether a file begins like an index file. It may be another FITS file.
     pub fn is_like(head: &[u8]) -> bool {
@@ -53,16 +71,9 @@ impl IndexFile {
     pub fn open(path: &Path, file: FileRanges) -> Result<Self, Damage> {
         let (primary, tables) = read_tables(&file)?;
         let side: u32 = primary.number("HPNSIDE").unwrap_or(0);
-        let covered = match primary.number("HEALPIX").unwrap_or(-1) {
+        let covered = match primary.number("HEALPIX").unwrap_or(-1_i64) {
             ..0 => None,
-            number if side == 0 => {
-                let message = format!("HEALPIX = {number} without HPNSIDE");
-                return Err(Damage::Invalid(message));
-            }
-            number => Some(CoveredCell {
-                number: number as u32,
-                side,
-            }),
+            number => Some(CoveredCell::new(number, side)?),
         };
         if !tables.iter().any(|table| table.is_called(HEADER)) {
             return Err(Damage::Invalid(format!("without the table {HEADER}")));
