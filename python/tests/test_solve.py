@@ -77,8 +77,10 @@ def test_threads_and_hints_do_not_move_the_answer(pipeline, pixels, result):
     fov = result.to_dict()["optics"]["fov_x_deg"]
     found = pipeline.solve(pixels, fov=fov, near=(near["ra_deg"], near["dec_deg"]), radius=5)
     np.testing.assert_allclose(found.quaternion, result.quaternion, atol=2e-7)
+    # A wrong direction is dropped, and a note says so.
     elsewhere = pipeline.solve(pixels, near=(near["ra_deg"] + 180.0, 0.0), radius=5)
-    assert not elsewhere
+    np.testing.assert_allclose(elsewhere.quaternion, result.quaternion, atol=2e-7)
+    assert "direction_wrong" in {note["code"] for note in elsewhere.to_dict()["notes"]}
 
 
 def test_centroids_are_identified(pipeline, pixels, result):

@@ -23,8 +23,6 @@ pub enum Remedy {
     Near,
     /// Angle of a pixel.
     PixelScale,
-    /// How far the centre may lie from that direction.
-    Radius,
     /// Detection threshold.
     Sigma,
     /// How long a frame may take.
@@ -43,7 +41,6 @@ impl Remedy {
             Self::MaxMemory => "max_memory",
             Self::Near => "near",
             Self::PixelScale => "pixel_scale",
-            Self::Radius => "radius",
             Self::Sigma => "sigma",
             Self::TimeLimit => "time_limit",
         }

@@ -26,6 +26,7 @@ use std::path::Path;
 pub struct Catalog {
     contents: Contents,
     checksum: u64,
+    v_sigma_mag: f64,
 }
 
 impl Catalog {
@@ -58,7 +59,11 @@ impl Catalog {
 
     fn from_contents(contents: Contents) -> Self {
         let checksum = compact::checksum_of(&compact::encode(&contents));
-        Self { contents, checksum }
+        Self {
+            contents,
+            checksum,
+            v_sigma_mag: 0.0,
+        }
     }
 
     /// Decodes the compact form.
@@ -69,6 +74,7 @@ impl Catalog {
         Ok(Self {
             contents: compact::decode(bytes)?,
             checksum: compact::checksum_of(bytes),
+            v_sigma_mag: 0.0,
         })
     }
 
@@ -83,6 +89,20 @@ impl Catalog {
     /// [`CatalogError::Write`] if the folder is not writable.
     pub fn write_compact(&self, path: &Path) -> Result<(), CatalogError> {
         files::write(path, &self.to_compact()).map_err(CatalogError::write(path))
+    }
+
+    /// The same, where the V magnitudes of all stars may be off together by this.
+    #[must_use]
+    pub(crate) fn with_v_sigma_mag(self, v_sigma_mag: f64) -> Self {
+        Self {
+            v_sigma_mag,
+            ..self
+        }
+    }
+
+    /// By how much the V magnitudes of all stars may be off together, where they are derived from another band.
+    pub(crate) const fn v_sigma_mag(&self) -> f64 {
+        self.v_sigma_mag
     }
 
     /// The title of the catalogue, for people.

@@ -79,8 +79,10 @@ pub(crate) fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePho
     let standards = Standards::select(&clear, frame, sky);
     let chosen = standards.chosen(by_v.fall.as_ref());
     let mut zero_point = zero_point::measure(&chosen);
+    let v_sigma_mag = sky.catalog().v_sigma_mag();
     if let Some(zero_point) = &mut zero_point {
         let common_sigma_mag = MAG_PER_RELATIVE * frame.detections.flux_scale_sigma;
+        let common_sigma_mag = libm::hypot(common_sigma_mag, v_sigma_mag);
         zero_point.sigma_mag = libm::hypot(zero_point.sigma_mag, common_sigma_mag);
     }
     let color_term = zero_point.as_ref().and_then(|zero| zero.color_term);
@@ -92,6 +94,9 @@ pub(crate) fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePho
             star.v_mag - term.value * redder_mag
         }),
     };
+    if let Ok(limit) = &mut completeness.limit {
+        limit.sigma_mag = libm::hypot(limit.sigma_mag, v_sigma_mag);
+    }
     if frame.detections.is_truncated {
         let measured = frame.detections.sources.len();
         completeness.limit = Err(NoLimit::StarsLeftOut { measured });

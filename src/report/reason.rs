@@ -229,23 +229,13 @@ fn excluded_text(excluded: &Excluded) -> String {
         ra_rad * DEG_PER_RAD,
         dec_rad * DEG_PER_RAD,
     );
-    let mut conjunction = ", which";
-    if let Some(allowed) = excluded.allowed_fov_x_rad {
-        let allowed = range(allowed);
-        text += &format!("{conjunction} is outside the given range of widths, {allowed}");
-        conjunction = ", and which";
-    }
-    if let Some((distance_rad, radius_rad)) = excluded.distance_rad {
-        text += &format!(
-            "{conjunction} is {} from the given direction, beyond the search radius of {}",
-            degrees(distance_rad),
-            degrees(radius_rad)
-        );
-        conjunction = ", and";
-    }
-    if conjunction == ", which" {
-        text += ", but only if the hints are ignored";
-    }
+    text += &match excluded.allowed_fov_x_rad {
+        Some(allowed) => {
+            let allowed = range(allowed);
+            format!(", which is outside the given range of widths, {allowed}")
+        }
+        None => ", but only if the given scale is ignored".to_owned(),
+    };
     text
 }
 
@@ -311,7 +301,6 @@ mod tests {
             boresight: UnitVector::from_ra_dec(10.0 * RAD_PER_DEG, -5.0 * RAD_PER_DEG),
             stars: 40,
             allowed_fov_x_rad: Some([18.0 * RAD_PER_DEG, 22.0 * RAD_PER_DEG]),
-            distance_rad: Some((23.0 * RAD_PER_DEG, 5.0 * RAD_PER_DEG)),
         };
         assert_eq!(
             text_of(
@@ -319,8 +308,7 @@ mod tests {
                 50
             ),
             "40 stars match in a field 11.4° wide around RA 10.00°, Dec -5.00°, which is outside the given \
-             range of widths, 18.0° to 22.0°, and which is 23.0° from the given direction, beyond the \
-             search radius of 5.00°"
+             range of widths, 18.0° to 22.0°"
         );
     }
 

@@ -44,14 +44,8 @@ impl Reason {
             }
             Self::Search(SearchFailure::Interrupted) => vec![Remedy::TimeLimit],
             Self::Diagnosis(Diagnosis::TooNarrow { .. }) => vec![Remedy::Catalog],
-            Self::Diagnosis(Diagnosis::HintsExclude(excluded)) => {
-                let scale = excluded
-                    .allowed_fov_x_rad
-                    .map(|_| [Remedy::Fov, Remedy::PixelScale]);
-                let region = excluded
-                    .distance_rad
-                    .map(|_| [Remedy::Near, Remedy::Radius]);
-                scale.into_iter().chain(region).flatten().collect()
+            Self::Diagnosis(Diagnosis::HintsExclude(_)) => {
+                vec![Remedy::Fov, Remedy::PixelScale]
             }
             Self::Diagnosis(_) => Vec::new(),
         }

@@ -140,19 +140,29 @@ fn a_field_too_narrow_for_the_catalog_says_so() {
 #[test]
 fn a_wrong_hint_is_reported_with_the_solution_without_it() {
     let picture = ORION.picture(&bright_stars());
-    let around = "24.0° wide around RA 83.0";
     let scale = ["24.0° wide", "range of widths, 36.0° to 44.0°"];
     check(&picture, &["--fov", "40"], "hints_exclude", &scale);
-    let elsewhere = ["--near", "103,0", "--radius", "5"];
-    let place = [around, "20.0° from the given direction", "radius of 5.00°"];
-    check(&picture, &elsewhere, "hints_exclude", &place);
     let both = ["--fov", "40", "--near", "103,0", "--radius", "5"];
-    check(
-        &picture,
-        &both,
-        "hints_exclude",
-        &["36.0° to 44.0°, and which is 20.0° from the given direction"],
-    );
+    check(&picture, &both, "hints_exclude", &scale);
+}
+
+#[test]
+fn a_wrong_direction_is_dropped_and_a_note_says_so() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = save(&ORION.picture(&bright_stars()), directory.path(), "frame.png");
+    let elsewhere = [["--near", "103,0"].as_slice(), &["--ra", "06h52m", "--dec", "0"]];
+    for direction in elsewhere {
+        let mut command = starpipe();
+        command.args(["process", "--format", "json", "--radius", "5"]);
+        let report = Ran::new(command.args(direction).arg(&path)).reports().remove(0);
+        assert_eq!(report["status"], "identified", "{direction:?}");
+        let notes = report["notes"].to_string();
+        assert!(notes.contains("20.0° from the given direction"), "{notes}");
+    }
+    let mut command = starpipe();
+    command.args(["process", "--format", "json", "--ra", "83", "--dec", "0"]);
+    let report = Ran::new(command.arg(&path)).reports().remove(0);
+    assert!(!report["notes"].to_string().contains("direction"));
 }
 
 #[test]

@@ -11,6 +11,7 @@
 
 mod astap;
 mod astrometry;
+mod band;
 mod coverage;
 mod error;
 mod fits_tables;
@@ -20,6 +21,7 @@ mod region;
 mod stored;
 mod tables;
 
+pub use band::Band;
 pub use error::Damage;
 pub(crate) use healpix::SkyZone;
 pub use installed::{installed_paths, installed_paths_below};
@@ -71,8 +73,8 @@ enum Stock {
 pub struct DeepContents {
     /// Its kind, for people.
     pub kind: String,
-    /// The band of its magnitudes, for people.
-    pub band: String,
+    /// The band of its magnitudes.
+    pub band: Band,
     /// Number of stars.
     pub stars: u64,
     /// Share of the sky that it covers.
@@ -86,7 +88,7 @@ impl DeepContents {
     pub fn of(catalog: &Catalog) -> Self {
         Self {
             kind: catalog.title().to_owned(),
-            band: "Johnson V".to_owned(),
+            band: Band::JohnsonV,
             stars: catalog.stars().len() as u64,
             share_of_sky: 1.0,
             epoch_year: Some(catalog.epoch_year()),
@@ -177,28 +179,28 @@ impl DeepCatalog {
             Stock::Indexes(indexes) => contents_of_indexes(indexes),
             Stock::Areas(database) => DeepContents {
                 kind: format!("ASTAP database {}", database.name.to_ascii_uppercase()),
-                band: database.band().to_owned(),
+                band: database.band(),
                 stars: database.records(),
                 share_of_sky: database.share_of_sky(),
                 epoch_year: database.epoch_year(),
             },
             Stock::Wide(wide) => DeepContents {
                 kind: "ASTAP database of bright stars".to_owned(),
-                band: "Johnson V".to_owned(),
+                band: Band::JohnsonV,
                 stars: wide.stars.len() as u64,
                 share_of_sky: 1.0,
                 epoch_year: None,
             },
             Stock::Tables(tables) => DeepContents {
                 kind: tables.loaded.catalog.title().to_owned(),
-                band: "Johnson V, from those of Gaia".to_owned(),
+                band: Band::GaiaColors,
                 stars: tables.stars().len() as u64,
                 share_of_sky: tables.share_of_sky,
                 epoch_year: Some(tables.loaded.catalog.epoch_year()),
             },
             Stock::Stored(StoredCatalog { summary, .. }) => DeepContents {
                 kind: summary.title.clone(),
-                band: "Johnson V".to_owned(),
+                band: Band::JohnsonV,
                 stars: summary.stars,
                 share_of_sky: 1.0,
                 epoch_year: Some(summary.epoch_year),
@@ -321,7 +323,7 @@ fn contents_of_indexes(indexes: &[IndexFile]) -> DeepContents {
     let smallest = indexes.first().map(|index| index.widest_quad_rad);
     let densest = indexes.iter();
     let densest = densest.filter(|index| Some(index.widest_quad_rad) == smallest);
-    let (mut stars, mut share, mut band) = (0, 0.0, "none");
+    let (mut stars, mut share, mut band) = (0, 0.0, Band::Unknown);
     for index in densest {
         let (of_file, band_of_file) = index.contents();
         stars += of_file;
@@ -330,7 +332,7 @@ fn contents_of_indexes(indexes: &[IndexFile]) -> DeepContents {
     }
     DeepContents {
         kind: "index files of astrometry.net".to_owned(),
-        band: band.to_owned(),
+        band,
         stars,
         share_of_sky: f64::min(share, 1.0),
         epoch_year: None,

@@ -138,9 +138,6 @@ pub struct Excluded {
     pub stars: usize,
     /// The stated field of view, from and to, in radians, where it excludes the solution.
     pub allowed_fov_x_rad: Option<[f64; 2]>,
-    /// Distance from the stated direction and the stated radius, in radians, where they exclude the
-    /// solution.
-    pub distance_rad: Option<(f64, f64)>,
 }
 
 impl Diagnosis {

@@ -65,12 +65,10 @@ pub(crate) fn diagnose(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diag
         .or_else(|| doubles::find(case.field).map(Diagnosis::DoubleExposure))
 }
 
-/// Searches again without the priors.
+/// Searches again without the scale. Whoever searches only near a direction first does so without it then.
 fn excluded(case: &Unidentified, sky: &IndexedCatalog) -> Option<Diagnosis> {
     let priors = case.priors.binding();
-    if !priors.restrict_search() {
-        return None;
-    }
+    priors.scale?;
     let found = identify(case.field, &Priors::default(), sky).ok()?;
     Some(Diagnosis::HintsExclude(Box::new(contradiction(
         case, &priors, &found,
@@ -83,9 +81,6 @@ fn contradiction(case: &Unidentified, priors: &Priors, found: &Identification) -
     let width_px = case.field.width_px;
     let allowed = priors.pixel_scale_range_rad(width_px);
     let excluding = allowed.filter(|[low, high]| !(*low..=*high).contains(&pixel_rad));
-    let distance = priors
-        .near
-        .map(|near| (boresight.angle_to(&near.centre), near.radius_rad));
     Excluded {
         fov_x_rad: found
             .camera
@@ -94,7 +89,6 @@ fn contradiction(case: &Unidentified, priors: &Priors, found: &Identification) -
         boresight,
         stars: found.matches.len(),
         allowed_fov_x_rad: excluding.map(|scale| fields_of_view(scale, width_px)),
-        distance_rad: distance.filter(|(away, radius)| away > radius),
     }
 }
 

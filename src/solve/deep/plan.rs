@@ -177,6 +177,7 @@ fn sweep(known: Option<[f64; 2]>, deep: &DeepContents) -> Vec<Attempt> {
 mod tests {
     use super::*;
     use crate::base::coords::UnitVector;
+    use crate::catalog::deep::Band;
     use crate::identify::{Scale, ScalePrior};
 
     const SIZE: Size = Size {
@@ -187,7 +188,7 @@ mod tests {
     fn contents(per_sq_deg: f64, share_of_sky: f64) -> DeepContents {
         DeepContents {
             kind: String::new(),
-            band: String::new(),
+            band: Band::GaiaColors,
             stars: (per_sq_deg * WHOLE_SKY_SQ_DEG * share_of_sky) as u64,
             share_of_sky,
             epoch_year: None,

@@ -238,7 +238,8 @@ impl DeepSky {
             area_sq_deg: region.area_sq_deg(),
             fov_range_rad: [fov_rad * 0.97, fov_rad * 1.03],
         };
-        let catalog = Arc::new(self.kept(merged)?);
+        let catalog = self.kept(merged)?;
+        let catalog = Arc::new(catalog.with_v_sigma_mag(contents.band.v_sigma_mag()));
         let indexed = IndexedCatalog::of_part(catalog, part, None, &|_| (), interrupt);
         indexed.ok().map(Arc::new)
     }

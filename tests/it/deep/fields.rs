@@ -3,6 +3,7 @@
 use super::areas;
 use super::index_file::{Series, index_file};
 use super::patch::{Patch, near};
+use super::tables::Form;
 use crate::common::{Ran, sky, starpipe};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -188,6 +189,11 @@ fn fields_of_a_fifth_to_half_a_degree_are_identified_with_each_kind_of_catalogue
     ] {
         let path = folder.path().join(format!("index-{name}.fits"));
         fs::write(&path, index_file(&patch.stars, series, false)).unwrap();
+        assert_fields(&path, &patch);
+    }
+    for form in Form::ALL {
+        let path = folder.path().join(form.file_name());
+        form.write(&path, &patch);
         assert_fields(&path, &patch);
     }
     for (name, coarse, colored) in [("d80", false, false), ("v05", true, true)] {

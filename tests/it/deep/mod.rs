@@ -8,3 +8,4 @@ mod patch;
 mod reading;
 #[cfg(target_os = "linux")]
 mod sparse;
+mod tables;

@@ -3,6 +3,7 @@
 use super::areas;
 use super::index_file::{Series, index_file};
 use super::patch::{DrawnStar, Patch};
+use super::tables::Form;
 use starpipe::base::interrupt::Interrupt;
 use starpipe::base::units::{RAD_PER_ARCSEC, RAD_PER_DEG};
 use starpipe::catalog::Star;
@@ -101,6 +102,29 @@ fn databases_of_areas_are_read() {
             .find(|path| path.extension().unwrap() != "txt")
             .unwrap();
         assert_eq!(stars_in(&one, region).len(), read.len());
+    }
+}
+
+#[test]
+fn tables_of_gaia_are_read_in_each_form() {
+    let patch = Patch::draw([0.2, 51.0], 2.0, 1200.0, 5);
+    let folder = tempfile::tempdir().unwrap();
+    for form in Form::ALL {
+        let path = folder.path().join(form.file_name());
+        form.write(&path, &patch);
+        let region = circle(&patch, 0.9);
+        let read = stars_in(&path, region);
+        assert_same(&read, &patch, region, 0.005, 0.002);
+        let colored = read.iter().filter(|star| star.bv_mag.is_some()).count();
+        assert!((0.85..0.95).contains(&(colored as f64 / read.len() as f64)));
+        assert!(
+            read.iter()
+                .all(|star| star.id.to_string().starts_with("GAIA 1152921504"))
+        );
+        // Its density is that of the part of the sky that it covers.
+        let contents = DeepCatalog::find(&path).unwrap()[0].contents();
+        let density = contents.per_sq_deg();
+        assert!((900.0..1300.0).contains(&density), "{form:?}: {density}");
     }
 }
 

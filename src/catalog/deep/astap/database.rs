@@ -2,6 +2,7 @@
 
 use super::records::{AstapHeader, AstapStar, HEADER_BYTES, RecordReader};
 use super::tiling::{Area, Tiling};
+use crate::catalog::deep::band::Band;
 use crate::base::coords::UnitVector;
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
@@ -80,9 +81,9 @@ impl AreaDatabase {
         self.header.epoch_year
     }
 
-    /// The band of its magnitudes, for people.
-    pub fn band(&self) -> &'static str {
-        if self.is_v() { "Johnson V" } else { "Gaia BP" }
+    /// The band of its magnitudes.
+    pub fn band(&self) -> Band {
+        if self.is_v() { Band::JohnsonV } else { Band::GaiaBp }
     }
 
     fn is_v(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::magnitude::MagnitudeColumns;
 use super::tree::{DATA, HEADER, StarTree};
+use crate::catalog::deep::band::Band;
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
@@ -107,7 +108,7 @@ impl IndexFile {
     }
 
     /// Number of stars, and the band of their magnitudes.
-    pub fn contents(&self) -> (u64, &'static str) {
+    pub fn contents(&self) -> (u64, Band) {
         let details = Details::find(&self.tables, self.share_of_sky());
         let vectors = self.tables.iter().find(|table| table.is_called(DATA));
         (vectors.map_or(0, |table| table.rows.count), details.band())
@@ -218,11 +219,11 @@ impl<'a> Details<'a> {
         }
     }
 
-    const fn band(&self) -> &'static str {
+    const fn band(&self) -> Band {
         match self {
             Self::Table { magnitudes, .. } => magnitudes.band(),
-            Self::Ranks { .. } => "none; estimated from ranks of brightness",
-            Self::None => "none",
+            Self::Ranks { .. } => Band::Ranks,
+            Self::None => Band::Unknown,
         }
     }
 

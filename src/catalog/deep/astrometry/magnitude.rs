@@ -1,5 +1,6 @@
 //! The V magnitude of a star by the table beside the tree.
 
+use crate::catalog::deep::band::Band;
 use crate::catalog::deep::fits_tables::{Column, FitsTable};
 use crate::catalog::gaia;
 use crate::catalog::star::rounded_mag;
@@ -58,14 +59,14 @@ impl<'a> MagnitudeColumns<'a> {
         }
     }
 
-    /// The magnitudes that they hold, for people.
-    pub const fn band(&self) -> &'static str {
+    /// The magnitudes that they hold.
+    pub const fn band(&self) -> Band {
         match self {
-            Self::Tycho(..) => "Tycho BT and VT",
-            Self::Gaia(_, Some(_)) => "Gaia G, BP and RP",
-            Self::Gaia(_, None) => "Gaia G",
-            Self::TwoMass(_) => "2MASS J",
-            Self::Other(_) => "an unknown band",
+            Self::Tycho(..) => Band::Tycho,
+            Self::Gaia(_, Some(_)) => Band::GaiaColors,
+            Self::Gaia(_, None) => Band::GaiaG,
+            Self::TwoMass(_) => Band::TwoMassJ,
+            Self::Other(_) => Band::Unknown,
         }
     }
 }
