@@ -7,11 +7,12 @@ use super::import::{
     RowParser, SourceFile, combine,
 };
 use super::sky2000::FixedWidth;
-use super::table::CatalogTable;
+use super::table::{CatalogTable, VotableText, is_votable};
 use super::tycho2::Tycho2;
 use super::{Catalog, CatalogError, compact};
 use crate::base::interrupt::Interrupt;
 use rayon::prelude::*;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 impl Catalog {
@@ -113,6 +114,7 @@ enum CatalogFileKind {
     Compact,
     Sky2000,
     Tycho2(Tycho2),
+    Votable,
     /// Or none of them.
     Table,
 }
@@ -123,8 +125,18 @@ impl CatalogFileKind {
             Self::Compact
         } else if FixedWidth::is_in(head) {
             Self::Sky2000
+        } else if is_votable(head) {
+            Self::Votable
         } else {
             Tycho2::detect(head).map_or(Self::Table, Self::Tycho2)
+        }
+    }
+
+    /// The rows of `file`, which is of this kind, as text.
+    fn text_of(&self, file: OpenedFile) -> Box<dyn BufRead> {
+        match self {
+            Self::Votable => Box::new(BufReader::new(VotableText::new(file.reader))),
+            _ => file.reader,
         }
     }
 }
@@ -145,10 +157,11 @@ fn read_compact(path: &Path, file: OpenedFile) -> Result<Catalog, CatalogError> 
 /// Reads the records of a file that is not compact.
 fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError> {
     let kind = CatalogFileKind::of(&file.head);
-    let mut rows = ImportRows::new(file.reader);
+    let mut rows = ImportRows::new(kind.text_of(file));
     let format: Box<dyn RowParser + Send> = match kind {
         CatalogFileKind::Sky2000 => Box::new(FixedWidth),
         CatalogFileKind::Tycho2(file) => Box::new(file),
+        CatalogFileKind::Votable => Box::new(CatalogTable::open(&mut rows, path)?.of_votable()),
         CatalogFileKind::Compact | CatalogFileKind::Table => {
             Box::new(CatalogTable::open(&mut rows, path)?)
         }
@@ -177,15 +190,17 @@ impl CatalogDirectory {
         let mut has_supplement_1 = false;
         for path in files_in(path)? {
             let file = OpenedFile::open(&path, interrupt)?;
-            match CatalogFileKind::of(&file.head) {
+            let kind = CatalogFileKind::of(&file.head);
+            match kind {
                 CatalogFileKind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
                 CatalogFileKind::Tycho2(part) => {
                     has_supplement_1 |= part == Tycho2::Supplement1;
                     found.tycho2.push(path);
                 }
                 CatalogFileKind::Compact | CatalogFileKind::Sky2000 => found.others.push(path),
-                CatalogFileKind::Table => {
-                    match CatalogTable::open(&mut ImportRows::new(file.reader), &path) {
+                CatalogFileKind::Votable | CatalogFileKind::Table => {
+                    let mut rows = ImportRows::new(kind.text_of(file));
+                    match CatalogTable::open(&mut rows, &path) {
                         Ok(_) => found.others.push(path),
                         Err(error) if error.is_of_system() => return Err(error),
                         Err(_) => {}
