@@ -8,11 +8,12 @@ use std::{fmt, io};
 
 /// The readable kinds of files, for messages.
 const KINDS_READ: &str = "a compact starpipe catalog, SKY2000 records of 520 bytes, the files of \
-     Tycho-2, or a table with headings for identifiers, right ascension, declination and magnitude, \
-     plain or gzip";
+     Tycho-2, or a table (text or VOTable) with headings for identifiers, right ascension, declination \
+     and magnitude, plain or gzip";
 /// The kinds of files that can be imported, for messages.
-const KINDS_IMPORTED: &str = "SKY2000 records of 520 bytes, the files of Tycho-2, or a table with \
-     headings for identifiers, right ascension, declination and magnitude, plain or gzip";
+const KINDS_IMPORTED: &str = "SKY2000 records of 520 bytes, the files of Tycho-2, or a table (text \
+     or VOTable) with headings for identifiers, right ascension, declination and magnitude, plain or \
+     gzip";
 
 /// Why a catalogue could not be read, made or written.
 #[derive(Debug, thiserror::Error)]

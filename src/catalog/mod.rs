@@ -28,6 +28,8 @@
 //!   preferred to VT, VT to any other) and optionally proper motion (`pmra`, `pmdec`) and epoch
 //!   (`ref_epoch`, `epoch`, or the epoch in VizieR's comments). [`SourceFile::kind`] reports the
 //!   columns used.
+//! - Such a table as a VOTable of an archive, VizieR or TOPCAT, with its rows in TABLEDATA, BINARY
+//!   or BINARY2. The epoch is also taken from its coordinate system.
 //! - A directory with one file of any other kind.
 //!
 //! A valid record without a position or a magnitude gives no star; a record that cannot be parsed,

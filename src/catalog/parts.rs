@@ -2,9 +2,10 @@
 
 use super::import::{CatalogPart, ImportRows, ImportTally, OpenedFile, RowParser};
 use super::sky2000::FixedWidth;
-use super::table::CatalogTable;
+use super::table::{CatalogTable, VotableText, is_votable};
 use super::tycho2::Tycho2;
 use super::{CatalogError, compact};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// The kind of a file, as far as its first bytes tell.
@@ -12,6 +13,7 @@ pub(super) enum CatalogFileKind {
     Compact,
     Sky2000,
     Tycho2(Tycho2),
+    Votable,
     /// Or none of them.
     Table,
 }
@@ -22,8 +24,18 @@ impl CatalogFileKind {
             Self::Compact
         } else if FixedWidth::is_in(head) {
             Self::Sky2000
+        } else if is_votable(head) {
+            Self::Votable
         } else {
             Tycho2::detect(head).map_or(Self::Table, Self::Tycho2)
+        }
+    }
+
+    /// The rows of `file`, which is of this kind, as text.
+    pub(super) fn text_of(&self, file: OpenedFile) -> Box<dyn BufRead> {
+        match self {
+            Self::Votable => Box::new(BufReader::new(VotableText::new(file.reader))),
+            _ => file.reader,
         }
     }
 }
@@ -31,10 +43,11 @@ impl CatalogFileKind {
 /// Reads the records of a file that is not compact.
 pub(super) fn read_part(path: &Path, file: OpenedFile) -> Result<CatalogPart, CatalogError> {
     let kind = CatalogFileKind::of(&file.head);
-    let mut rows = ImportRows::new(file.reader);
+    let mut rows = ImportRows::new(kind.text_of(file));
     let format: Box<dyn RowParser + Send> = match kind {
         CatalogFileKind::Sky2000 => Box::new(FixedWidth),
         CatalogFileKind::Tycho2(file) => Box::new(file),
+        CatalogFileKind::Votable => Box::new(CatalogTable::open(&mut rows, path)?.of_votable()),
         CatalogFileKind::Compact | CatalogFileKind::Table => {
             Box::new(CatalogTable::open(&mut rows, path)?)
         }

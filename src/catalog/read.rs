@@ -141,15 +141,17 @@ impl CatalogDirectory {
         let mut has_supplement_1 = false;
         for path in files_in(path)? {
             let file = OpenedFile::open(&path, interrupt)?;
-            match CatalogFileKind::of(&file.head) {
+            let kind = CatalogFileKind::of(&file.head);
+            match kind {
                 CatalogFileKind::Tycho2(Tycho2::Supplement2) => found.left_out.push(path),
                 CatalogFileKind::Tycho2(part) => {
                     has_supplement_1 |= part == Tycho2::Supplement1;
                     found.tycho2.push(path);
                 }
                 CatalogFileKind::Compact | CatalogFileKind::Sky2000 => found.others.push(path),
-                CatalogFileKind::Table => {
-                    match CatalogTable::open(&mut ImportRows::new(file.reader), &path) {
+                CatalogFileKind::Votable | CatalogFileKind::Table => {
+                    let mut rows = ImportRows::new(kind.text_of(file));
+                    match CatalogTable::open(&mut rows, &path) {
                         Ok(_) => found.others.push(path),
                         Err(error) if error.is_of_system() => return Err(error),
                         Err(_) => {}

@@ -149,12 +149,21 @@ fn a_wrong_hint_is_reported_with_the_solution_without_it() {
 #[test]
 fn a_wrong_direction_is_dropped_and_a_note_says_so() {
     let directory = tempfile::tempdir().unwrap();
-    let path = save(&ORION.picture(&bright_stars()), directory.path(), "frame.png");
-    let elsewhere = [["--near", "103,0"].as_slice(), &["--ra", "06h52m", "--dec", "0"]];
+    let path = save(
+        &ORION.picture(&bright_stars()),
+        directory.path(),
+        "frame.png",
+    );
+    let elsewhere = [
+        ["--near", "103,0"].as_slice(),
+        &["--ra", "06h52m", "--dec", "0"],
+    ];
     for direction in elsewhere {
         let mut command = starpipe();
         command.args(["process", "--format", "json", "--radius", "5"]);
-        let report = Ran::new(command.args(direction).arg(&path)).reports().remove(0);
+        let report = Ran::new(command.args(direction).arg(&path))
+            .reports()
+            .remove(0);
         assert_eq!(report["status"], "identified", "{direction:?}");
         let notes = report["notes"].to_string();
         assert!(notes.contains("20.0° from the given direction"), "{notes}");

@@ -24,10 +24,11 @@ impl TableStars {
     /// Whether a file is one, by its first bytes and its headings.
     pub fn is_one(path: &Path) -> Result<bool, CatalogError> {
         let file = OpenedFile::open(path, &Interrupt::default())?;
-        if !matches!(CatalogFileKind::of(&file.head), CatalogFileKind::Table) {
+        let kind = CatalogFileKind::of(&file.head);
+        if !matches!(kind, CatalogFileKind::Table | CatalogFileKind::Votable) {
             return Ok(false);
         }
-        match CatalogTable::open(&mut ImportRows::new(file.reader), path) {
+        match CatalogTable::open(&mut ImportRows::new(kind.text_of(file)), path) {
             Ok(table) => Ok(table.is_of_gaia()),
             Err(error) if error.is_of_system() => Err(error),
             // Another file, or a table that is read as a whole: there it tells what is wrong.

@@ -7,7 +7,7 @@ pub(super) const SEPARATORS: [u8; 4] = *b"\t;|,";
 
 /// Whether cells may be quoted with this separator. With others, a quote is an inch sign.
 pub(super) fn may_quote(separator: u8) -> bool {
-    b",;".contains(&separator)
+    b",; ".contains(&separator)
 }
 
 /// The units in a line below the headings; `None` if it is not a line of units.

@@ -18,5 +18,7 @@ mod reader;
 mod roles;
 mod row;
 mod sky2000;
+mod votable;
 
 pub(super) use reader::CatalogTable;
+pub(super) use votable::{VotableText, is_votable};

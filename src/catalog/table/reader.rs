@@ -25,6 +25,8 @@ pub(in crate::catalog) struct CatalogTable {
     /// The lines of headings and units, which are repeated where tables were joined.
     headings: Vec<Vec<u8>>,
     columns: CatalogColumns,
+    /// What the file is called, for people.
+    form: &'static str,
 }
 
 /// The columns of a table.
@@ -40,17 +42,24 @@ impl CatalogTable {
         path: &Path,
     ) -> Result<Self, CatalogError> {
         let mut notes = HashMap::new();
+        let mut is_ecsv = false;
         let (line, heading) = loop {
             let lines_read = rows.lines_read();
             match rows.next().map_err(CatalogError::read(path, lines_read))? {
                 None => return Err(CatalogError::unknown_kind(path, b"")),
-                Some(row) if row.is_blank_or_comment() => notes.extend(column_note(row.bytes)),
+                Some(row) if row.is_blank_or_comment() => {
+                    is_ecsv |= row.bytes.starts_with(b"# %ECSV");
+                    notes.extend(column_note(row.bytes));
+                }
                 Some(row) => break (row.line, row.bytes.to_owned()),
             }
         };
         let text = heading.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&heading);
         let separators = SEPARATORS.into_iter();
         let separator = { separators }.find(|separator| text.contains(separator));
+        // Blanks are what ECSV has between columns unless it says otherwise.
+        let blank = || Some(b' ').filter(|blank| is_ecsv && text.contains(blank));
+        let separator = separator.or_else(blank);
         let separator = separator.ok_or_else(|| CatalogError::unknown_kind(path, text))?;
         if may_quote(separator) {
             rows.quote_between(separator);
@@ -79,6 +88,7 @@ impl CatalogTable {
             width: labels.len(),
             headings,
             columns,
+            form: "table",
         })
     }
 
@@ -87,6 +97,14 @@ impl CatalogTable {
         match &self.columns {
             CatalogColumns::Sky2000(..) => false,
             CatalogColumns::General(columns) => columns.magnitude.are_of_gaia(),
+        }
+    }
+
+    /// This table, of which the text was made from a VOTable.
+    pub(in crate::catalog) fn of_votable(self) -> Self {
+        Self {
+            form: "VOTable",
+            ..self
         }
     }
 
@@ -150,8 +168,8 @@ impl RowParser for CatalogTable {
 
     fn kind(&self) -> String {
         match &self.columns {
-            CatalogColumns::Sky2000(..) => "table with SKY2000's columns".to_owned(),
-            CatalogColumns::General(columns) => format!("table: {}", columns.description()),
+            CatalogColumns::Sky2000(..) => format!("{} with SKY2000's columns", self.form),
+            CatalogColumns::General(columns) => format!("{}: {}", self.form, columns.description()),
         }
     }
 
@@ -204,4 +222,23 @@ fn column_note(comment: &[u8]) -> Option<(String, String)> {
     let text = String::from_utf8_lossy(comment.strip_prefix(b"#Column\t")?);
     let (label, note) = text.split_once('\t')?;
     Some((label.trim().to_owned(), note.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ecsv_may_have_blanks_between_columns() {
+        let ecsv = "# %ECSV 1.0\n# ---\n# datatype:\n# - {name: ra, unit: deg, datatype: float64}\n\
+            source_id ra dec phot_g_mean_mag designation\n1 2.5 -3.5 4.5 \"Gaia DR3 1\"\n";
+        let mut rows = ImportRows::new(ecsv.as_bytes());
+        let table = CatalogTable::open(&mut rows, Path::new("x")).unwrap();
+        let row = rows.next().unwrap().unwrap();
+        assert_eq!(split(row.bytes, table.separator).len(), table.width);
+        assert!(table.parse(row).is_ok());
+        let other = ecsv.replace("%ECSV", "");
+        let mut rows = ImportRows::new(other.as_bytes());
+        assert!(CatalogTable::open(&mut rows, Path::new("x")).is_err());
+    }
 }

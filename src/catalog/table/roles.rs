@@ -333,7 +333,7 @@ impl Epoch {
 }
 
 /// The year after "epoch" or "Ep" in a note, as in `at Ep=2016.0` or `Epoch=J1991.25`.
-fn epoch_in(note: &str) -> Option<f64> {
+pub(super) fn epoch_in(note: &str) -> Option<f64> {
     let note = note.to_lowercase();
     let starts = note.match_indices("ep").map(|(at, _)| &note[at + 2..]);
     let mut years = starts.filter_map(|rest| {

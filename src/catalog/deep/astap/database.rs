@@ -2,11 +2,11 @@
 
 use super::records::{AstapHeader, AstapStar, HEADER_BYTES, RecordReader};
 use super::tiling::{Area, Tiling};
-use crate::catalog::deep::band::Band;
 use crate::base::coords::UnitVector;
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
+use crate::catalog::deep::band::Band;
 use crate::catalog::deep::error::Damage;
 use crate::catalog::deep::region::Region;
 use crate::catalog::star::rounded_mag;
@@ -83,7 +83,11 @@ impl AreaDatabase {
 
     /// The band of its magnitudes.
     pub fn band(&self) -> Band {
-        if self.is_v() { Band::JohnsonV } else { Band::GaiaBp }
+        if self.is_v() {
+            Band::JohnsonV
+        } else {
+            Band::GaiaBp
+        }
     }
 
     fn is_v(&self) -> bool {
