@@ -19,4 +19,10 @@ mod roles;
 mod row;
 mod sky2000;
 
+#[cfg(feature = "archive")]
+pub(super) use columns::GeneralColumns;
+#[cfg(feature = "archive")]
+pub(super) use headings::Heading;
 pub(super) use reader::CatalogTable;
+#[cfg(feature = "archive")]
+pub(super) use row::GeneralRow;
