@@ -2,7 +2,7 @@
 """Draws narrow fields, identifies them with starpipe and with solve-field, and tables rates, times and errors.
 
     python3 scripts/narrow-fields.py target/release/starpipe --index /usr/share/astrometry/index-tycho2-07.littleendian.fits
-        [--fields 0.4,0.5,0.75,1,1.5] [--count 40] [--modes blind,hints,wrong] [--solve-field] [--seed NUMBER]
+        [--fields 0.4,0.5,0.75,1,1.5] [--count 40] [--modes blind,hints,wrong] [--object galaxy|cluster] [--solve-field] [--seed NUMBER]
 
 Needs numpy. The stars are those of an index file of astrometry.net, read here by code of its own, each moved by
 0.15" and changed by the color of a camera, with fainter ones of a galactic disc beside them. Nothing is taken from
@@ -100,7 +100,28 @@ def faint_stars(rng, radius_deg, latitude_deg, brighter):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], 1), mags
 
 
-def draw(rng, catalog, fov_deg):
+def cluster(rng):
+    """Places and magnitudes of the stars of a globular cluster, as Plummer distributes them."""
+    number, core_px = 4000, rng.uniform(40, 110)
+    radius = core_px / np.sqrt(rng.uniform(0.02, 1, number) ** (-2 / 3) - 1 + 1e-9)
+    angle = rng.uniform(0, 2 * math.pi, number)
+    mags = np.minimum(11.5 + rng.gamma(4.0, 0.8, number), 18)
+    return radius * np.cos(angle) + WIDTH / 2, radius * np.sin(angle) + HEIGHT / 2, mags
+
+
+def galaxy(rng, sky):
+    """Light of an inclined disc with a nucleus that fills the frame."""
+    length, axis, angle = rng.uniform(0.1, 0.25) * WIDTH, rng.uniform(0.3, 1), rng.uniform(0, math.pi)
+    x = np.arange(WIDTH)[None, :] - WIDTH / 2
+    y = np.arange(HEIGHT)[:, None] - HEIGHT / 2
+    u = x * math.cos(angle) + y * math.sin(angle)
+    v = (-x * math.sin(angle) + y * math.cos(angle)) / axis
+    radius = np.hypot(u, v)
+    arms = 1 + 0.3 * np.cos(2 * np.arctan2(v, u) - radius / length * 3)
+    return sky * (rng.uniform(1, 5) * np.exp(-radius / length) * arms + 12 * np.exp(-radius / (0.06 * length)))
+
+
+def draw(rng, catalog, fov_deg, extended=None):
     """A frame and its truth."""
     vectors, mags = catalog
     ra, dec = rng.uniform(0, 360), math.asin(rng.uniform(-1, 1)) / RAD
@@ -126,12 +147,16 @@ def draw(rng, catalog, fov_deg):
         px = -px
     bend = 1 + rng.normal(0, 6e-4) * (px**2 + py**2) / (WIDTH / 2) ** 2
     px, py = px * bend + (WIDTH - 1) / 2, py * bend + (HEIGHT - 1) / 2
-    image = render(rng, px, py, all_mags)
+    if extended == "cluster":
+        more_x, more_y, more_mags = cluster(rng)
+        px, py = np.concatenate([px, more_x]), np.concatenate([py, more_y])
+        all_mags = np.concatenate([all_mags, more_mags])
+    image = render(rng, px, py, all_mags, extended)
     scale_arcsec = 206264.806 / focal
     return image, {"ra": ra, "dec": dec, "fov": fov_deg, "scale": scale_arcsec}
 
 
-def render(rng, px, py, mags):
+def render(rng, px, py, mags, extended):
     """A frame of 16 bits: sky, spots, noise."""
     fwhm = rng.uniform(2.2, 4.5)
     beta, stretch, angle = 2.8, 1 + abs(rng.normal(0, 0.08)), rng.uniform(0, math.pi)
@@ -143,6 +168,8 @@ def render(rng, px, py, mags):
     flux_at_limit = 6 * noise * math.sqrt(4 * math.pi * (fwhm / 2.355) ** 2)
     light = np.full((HEIGHT, WIDTH), sky)
     light *= 1 + 0.1 * np.linspace(-1, 1, WIDTH)[None, :] * rng.uniform(-1, 1)
+    if extended == "galaxy":
+        light += galaxy(rng, sky)
     half = 24
     for x0, y0, mag in zip(px, py, mags):
         if not (-half < x0 < WIDTH + half and -half < y0 < HEIGHT + half) or mag > limit + 2:
@@ -227,7 +254,8 @@ def starpipe(arguments, path, hint):
 
 def solve_field(arguments, path, hint):
     with tempfile.TemporaryDirectory() as folder:
-        command = ["solve-field", "--no-plots", "--overwrite", "--dir", folder, "--cpulimit", "120", path]
+        command = ["solve-field", "--no-plots", "--overwrite", "--dir", folder, path]
+        command += ["--cpulimit", str(arguments.cpu_limit)]
         if hint:
             ra, dec, scale = hint
             command += ["--ra", str(ra), "--dec", str(dec), "--radius", "2.1", "--scale-units", "arcsecperpix"]
@@ -249,7 +277,9 @@ def main():
     parser.add_argument("--fields", default="0.4,0.5,0.75,1,1.5")
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--modes", default="blind,hints,wrong")
+    parser.add_argument("--object", choices=["galaxy", "cluster"], help="what fills the frame")
     parser.add_argument("--solve-field", action="store_true")
+    parser.add_argument("--cpu-limit", type=int, default=30, help="seconds that solve-field may take")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--keep", default=None)
     arguments = parser.parse_args()
@@ -263,7 +293,7 @@ def main():
         results = {}
         for number in range(arguments.count):
             rng = np.random.default_rng([arguments.seed, int(fov * 1000), number])
-            image, truth = draw(rng, catalog, fov)
+            image, truth = draw(rng, catalog, fov, arguments.object)
             path = str(folder / f"field-{fov}-{number}.fits")
             write_fits(path, image)
             for mode in arguments.modes.split(","):

@@ -45,6 +45,7 @@
 //! Myers, Sande, Miller, Warren, Tracewell 2001, SKY2000 Catalog, Version 4 (CDS V/109); 2006,
 //! Version 5 (CDS V/145); NASA Goddard Space Flight Center, Flight Dynamics Division.
 
+mod band;
 mod bayer;
 pub(crate) mod boundaries;
 mod compact;
@@ -73,6 +74,7 @@ mod star_catalog;
 mod table;
 mod tycho2;
 
+pub use band::Band;
 pub use error::CatalogError;
 pub use error::{CompactError, RecordError, RecordLocation};
 pub use id::{HipparcosId, StarId, TychoId};

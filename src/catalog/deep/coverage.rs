@@ -1,60 +1,66 @@
-//! How much of the sky has stars of a catalogue.
+//! How much of the sky do some positions cover?
 
-use crate::base::units::RAD_PER_DEG;
-use crate::catalog::Star;
-use crate::catalog::sky_cells::SkyCells;
-use std::collections::HashSet;
+use super::healpix::HealpixCell;
+use crate::base::coords::{Icrs, UnitVector};
 
-/// The share of the sky where these stars are: of its cells those that hold one, where cells are so large that few of
-/// those within would be empty.
-pub fn share_of_sky(stars: &[Star]) -> f64 {
-    const HEIGHTS_DEG: [f64; 7] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-    const STARS_PER_CELL: usize = 12;
-    let share_at = |height_deg: f64| {
-        let cells = SkyCells::new(height_deg * RAD_PER_DEG, 0.0);
-        let held: HashSet<(usize, usize)> = stars
-            .iter()
-            .map(|star| cells.cell_of(&star.direction))
-            .collect();
-        let all: usize = (0..cells.zones).map(|zone| cells.zone(zone).cells).sum();
-        let is_even = held.len() * STARS_PER_CELL <= stars.len();
-        (held.len() as f64 / all as f64, is_even)
-    };
-    let mut shares = HEIGHTS_DEG.into_iter().map(share_at);
-    shares
-        .find(|(_, is_even)| *is_even)
-        .map_or(1.0, |(share, _)| share)
+/// The finest cells that are counted, 3.4 arcminutes wide.
+const ORDER: u32 = 10;
+
+/// Positions, by the cells that they lie in.
+#[derive(Default)]
+pub struct Coverage {
+    cells: Vec<HealpixCell>,
+}
+
+impl Coverage {
+    /// Adds the position of a star.
+    pub fn add(&mut self, direction: &UnitVector<Icrs>) {
+        self.cells.push(HealpixCell::of(direction, 1 << ORDER));
+    }
+
+    /// The share of the sky of the finest cells of which those with positions have enough of them that few are empty
+    /// by chance; `None` without stars.
+    pub fn share_of_sky(self) -> Option<f64> {
+        const ENOUGH: usize = 8;
+        let (count, mut cells) = (self.cells.len(), self.cells);
+        for order in (0..=ORDER).rev() {
+            cells.sort_unstable();
+            cells.dedup();
+            if order == 0 || cells.len() * ENOUGH <= count {
+                let all = 12.0 * libm::exp2(2.0 * f64::from(order));
+                return (count > 0).then_some(cells.len() as f64 / all);
+            }
+            cells = cells.into_iter().map(HealpixCell::parent).collect();
+        }
+        None
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::coords::UnitVector;
-    use crate::catalog::StarId;
-    use std::f64::consts::{PI, TAU};
+    use crate::base::units::RAD_PER_DEG;
 
-    fn stars_within(radius_rad: f64, count: u32) -> Vec<Star> {
-        let star = |number: u32| {
-            let share = |factor: f64| (factor * f64::from(number)).fract();
-            // Even on the cap around the pole.
-            let z = 1.0 - share(0.754_877_666_2) * (1.0 - radius_rad.cos());
-            let direction = UnitVector::from_ra_dec(TAU * share(0.618_033_988_7), z.asin());
-            Star::new(StarId::Number(u64::from(number)), direction, 10.0)
-        };
-        (0..count).map(star).collect()
+    fn share(radius_deg: f64, count: u32) -> f64 {
+        let mut coverage = Coverage::default();
+        for number in 0..count {
+            let from = radius_deg * (f64::from(number) / f64::from(count)).sqrt();
+            let (sin, cos) = libm::sincos(f64::from(number) * 2.4);
+            let [ra_rad, dec_rad] = [40.0 + from * sin, from * cos].map(|deg| deg * RAD_PER_DEG);
+            coverage.add(&UnitVector::from_ra_dec(ra_rad, dec_rad));
+        }
+        coverage.share_of_sky().unwrap()
     }
 
     #[test]
-    fn the_share_of_a_part_and_of_the_whole_sky_are_found() {
-        for (radius_rad, count) in [
-            (RAD_PER_DEG, 4000),
-            (5.0 * RAD_PER_DEG, 20_000),
-            (40.0 * RAD_PER_DEG, 30_000),
-            (PI, 300_000),
-        ] {
-            let expected = (1.0 - radius_rad.cos()) / 2.0;
-            let ratio = share_of_sky(&stars_within(radius_rad, count)) / expected;
-            assert!((0.95..1.5).contains(&ratio), "{radius_rad}: {ratio}");
-        }
+    fn a_small_field_is_a_small_share() {
+        let expected = std::f64::consts::PI / 41_252.96;
+        let found = share(1.0, 20_000);
+        assert!(
+            (expected..1.5 * expected).contains(&found),
+            "{found} {expected}"
+        );
+        assert!(share(1.0, 100) < 5.0 * expected);
+        assert_eq!(Coverage::default().share_of_sky(), None);
     }
 }

@@ -17,6 +17,9 @@ pub enum Damage {
     /// Reading was to end early.
     #[error("reading was interrupted")]
     Interrupted,
+    /// It is a table, but not of stars, or lacks columns of them.
+    #[error("it has no columns {0}")]
+    NoColumns(String),
     /// The format has what is not read here.
     #[error("it has {0}, which is not supported")]
     Unsupported(String),

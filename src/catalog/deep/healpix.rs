@@ -6,6 +6,8 @@
 use crate::base::coords::{Icrs, UnitVector};
 use crate::base::units::RAD_PER_DEG;
 use nalgebra::Vector3;
+#[cfg(feature = "archive")]
+use std::f64::consts::FRAC_PI_4;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A cell: one of the twelve faces, and its place there.
@@ -86,6 +88,74 @@ impl SkyZone {
             ))
         })
     }
+}
+
+/// Cells of 4 to the power of the order to a face, by their numbers in the nested scheme.
+#[cfg(feature = "archive")]
+impl HealpixCell {
+    /// The cell with a number; `order` is at most 29, and the number below 12 times that.
+    pub fn from_nested(number: u64, order: u32) -> Self {
+        let within = number & ((1 << (2 * order)) - 1);
+        Self {
+            face: (number >> (2 * order)) as u32,
+            x: even_bits(within),
+            y: even_bits(within >> 1),
+        }
+    }
+
+    /// The cell of twice its width that holds it.
+    pub const fn parent(self) -> Self {
+        Self {
+            face: self.face,
+            x: self.x / 2,
+            y: self.y / 2,
+        }
+    }
+
+    /// Its centre.
+    ///
+    /// # Reference
+    /// Calabretta & Roukema 2007, MNRAS 381, 865, sect. 4, in the form of `xyf2loc` of HEALPix.
+    pub fn centre(self, order: u32) -> UnitVector<Icrs> {
+        let side = libm::exp2(f64::from(order));
+        let along = |place: u32| (f64::from(place) + 0.5) / side;
+        let (u, v) = (along(self.x), along(self.y));
+        let (row, column) = (self.face / 4, self.face % 4);
+        // Sides of faces from the north pole to the south corner of the face, and eighths of a turn to it.
+        let corner = f64::from(row + 2);
+        let eighths = f64::from(2 * column + u32::from(row != 1));
+        let down = corner - u - v;
+        let (z, width) = if down < 1.0 {
+            (1.0 - down * down / 3.0, down)
+        } else if down > 3.0 {
+            let up = 4.0 - down;
+            (up * up / 3.0 - 1.0, up)
+        } else {
+            ((2.0 - down) * 2.0 / 3.0, 1.0)
+        };
+        let ra_rad = FRAC_PI_4 * (eighths + (u - v) / width);
+        UnitVector::from_ra_dec(ra_rad, libm::asin(z))
+    }
+}
+
+/// No place in a cell of this order is further from its centre.
+///
+/// # Reference
+/// `max_pixrad` of HEALPix.
+#[cfg(feature = "archive")]
+pub fn radius_of_cells_rad(order: u32) -> f64 {
+    let share = libm::exp2(-f64::from(order));
+    let centre = UnitVector::<Icrs>::from_ra_dec(FRAC_PI_4 * share, libm::asin(2.0 / 3.0));
+    let from_pole = 1.0 - share;
+    let corner = UnitVector::from_ra_dec(0.0, libm::asin(1.0 - from_pole * from_pole / 3.0));
+    centre.angle_to(&corner)
+}
+
+/// The number of every other bit, from the lowest on.
+#[cfg(feature = "archive")]
+fn even_bits(bits: u64) -> u32 {
+    let bit = |place: u32| ((bits >> (2 * place)) & 1) << place;
+    (0..32).map(bit).sum::<u64>() as u32
 }
 
 /// The face, and the place there from 0 to 1, near the equator.
@@ -181,6 +251,40 @@ mod tests {
         let across = UnitVector::from_ra_dec(FRAC_PI_2 + 0.001, 0.9);
         let zones = SkyZone::all().filter(|zone| zone.contains(&across, 0.01));
         assert_eq!(zones.count(), 2);
+    }
+
+    /// The inverse of finding the cell of a direction; some numbers as healpy gives them.
+    #[cfg(feature = "archive")]
+    #[test]
+    fn nested_cells_hold_their_centres_and_no_place_beyond_their_radius() {
+        for order in [0, 1, 3, 8] {
+            let radius_rad = radius_of_cells_rad(order);
+            let mut widest_rad: f64 = 0.0;
+            for number in 0..20_000u32 {
+                let z = 1.0 - (2.0 * f64::from(number) + 1.0) / 20_000.0;
+                let direction = UnitVector::from_ra_dec(f64::from(number) * 2.4, libm::asin(z));
+                let cell = HealpixCell::of(&direction, 1 << order);
+                let centre = cell.centre(order);
+                assert_eq!(HealpixCell::of(&centre, 1 << order), cell);
+                widest_rad = widest_rad.max(centre.angle_to(&direction));
+            }
+            assert!(widest_rad <= radius_rad, "{widest_rad} {radius_rad}");
+            assert!(widest_rad > 0.8 * radius_rad, "{widest_rad} {radius_rad}");
+            for number in 0..(12u64 << (2 * order)).min(3000) {
+                let cell = HealpixCell::from_nested(number, order);
+                let centre = cell.centre(order);
+                assert_eq!(HealpixCell::of(&centre, 1 << order), cell);
+                let parent = HealpixCell::from_nested(number / 4, order.saturating_sub(1));
+                if order > 0 {
+                    let side = 1 << (order - 1);
+                    assert_eq!(HealpixCell::of(&centre, side), parent);
+                }
+            }
+        }
+        let cell = HealpixCell::from_nested(0b1011, 1);
+        assert_eq!((cell.face, cell.x, cell.y), (2, 1, 1));
+        let cell = HealpixCell::from_nested(0b1001, 2);
+        assert_eq!((cell.face, cell.x, cell.y), (0, 1, 2));
     }
 
     /// Centres of faces, from the paper's figure 4.

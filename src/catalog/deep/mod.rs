@@ -5,45 +5,53 @@
 //!
 //! # Kinds
 //! - Index files of astrometry.net: the series 4100, 4200 and 5200, and others of the same form.
+//! - Tables of stars in the form of Parquet, as of Gaia: files with the same columns are one catalogue; and HATS
+//!   directories of such files. For these the feature `archive` is needed.
 //! - Databases of ASTAP and HNSKY, in files that end in `.1476`, `.290` and `.001`.
 //! - Tables of Gaia's stars, from its archive or from VizieR, which are held in memory.
 //! - The compact form, which is loaded whole when its stars are first needed.
 
 mod astap;
 mod astrometry;
-mod band;
 mod coverage;
 mod error;
 mod fits_tables;
 mod healpix;
 mod installed;
+#[cfg(feature = "archive")]
+mod parquet;
 mod region;
 mod stored;
 mod tables;
 
-pub use band::Band;
 pub use error::Damage;
 pub(crate) use healpix::SkyZone;
 pub use installed::{installed_paths, installed_paths_below};
 pub use region::Region;
 
+#[cfg(feature = "archive")]
+use super::folder::directories_in;
 use super::folder::files_in;
 use super::import::LoadedCatalog;
-use super::{Catalog, CatalogError, SourceFile, Star};
+use super::{Band, Catalog, CatalogError, SourceFile, Star};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::WHOLE_SKY_SQ_DEG;
 use astap::{AreaDatabase, WideDatabase};
 use astrometry::IndexFile;
+#[cfg(feature = "archive")]
+use parquet::{Hats, ParquetFile, Tables};
 use region::BrightestStars;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 use stored::StoredCatalog;
-use tables::TableStars;
+use tables::{GaiaTable, TableStars};
 use xxhash_rust::xxh3::Xxh3;
 
 /// Bytes of a file by which its kind is told: header cards of some generators come after a long history.
 const HEAD_BYTES: u64 = 2880;
+/// The beginning of a file of Parquet.
+const PARQUET_MAGIC: &[u8] = b"PAR1";
 
 /// A large catalogue, of which the stars of a part of the sky are read.
 #[derive(Debug)]
@@ -63,6 +71,12 @@ enum Stock {
     Wide(WideDatabase),
     /// Tables of Gaia.
     Tables(TableStars),
+    /// Files of Parquet with the same columns.
+    #[cfg(feature = "archive")]
+    Parquet(Tables),
+    /// A HATS directory.
+    #[cfg(feature = "archive")]
+    Hats(Hats),
     /// A catalogue in the compact form.
     Stored(StoredCatalog),
 }
@@ -131,6 +145,10 @@ impl DeepCatalog {
     /// As [`find`](Self::find).
     pub fn find_installed(path: &Path) -> Result<Vec<Self>, CatalogError> {
         let (mut indexes, mut tables, mut found) = (Vec::new(), Vec::new(), Vec::new());
+        #[cfg(feature = "archive")]
+        if path.is_dir() {
+            found.extend(hats_in(path)?.into_iter().map(Stock::Hats));
+        }
         let (files, beside) = if path.is_dir() {
             let files = files_in(path)?;
             (files.clone(), files)
@@ -141,11 +159,19 @@ impl DeepCatalog {
             .iter()
             .filter(|file| !path.is_dir() || may_be_one(file))
         {
-            match Stock::of_file(file)? {
-                Some(Stock::Indexes(index)) => indexes.extend(index),
-                Some(stock) => found.push(stock),
-                None if TableStars::is_one(file)? => tables.push(file.clone()),
-                None => {}
+            match Stock::of_file(file) {
+                // A directory may have other tables, too.
+                Err(CatalogError::Deep {
+                    error: Damage::NoColumns(_),
+                    ..
+                }) if path.is_dir() => {}
+                found_in_file => match found_in_file? {
+                    Some(Stock::Indexes(index)) => indexes.extend(index),
+                    #[cfg(feature = "archive")]
+                    Some(Stock::Parquet(tables)) => join(&mut found, tables),
+                    Some(stock) => found.push(stock),
+                    None => tables.extend(GaiaTable::find(file)?),
+                },
             }
         }
         let databases = AreaDatabase::find(&beside)
@@ -193,10 +219,26 @@ impl DeepCatalog {
             },
             Stock::Tables(tables) => DeepContents {
                 kind: tables.loaded.catalog.title().to_owned(),
-                band: Band::GaiaColors,
+                band: tables.band,
                 stars: tables.stars().len() as u64,
                 share_of_sky: tables.share_of_sky,
                 epoch_year: Some(tables.loaded.catalog.epoch_year()),
+            },
+            #[cfg(feature = "archive")]
+            Stock::Parquet(tables) => DeepContents {
+                kind: "table in Parquet".to_owned(),
+                band: tables.band(),
+                stars: tables.rows(),
+                share_of_sky: tables.share_of_sky(),
+                epoch_year: tables.epoch_year(),
+            },
+            #[cfg(feature = "archive")]
+            Stock::Hats(hats) => DeepContents {
+                kind: format!("HATS catalog {}", hats.name),
+                band: hats.band(),
+                stars: hats.rows(),
+                share_of_sky: hats.share_of_sky(),
+                epoch_year: hats.epoch_year(),
             },
             Stock::Stored(StoredCatalog { summary, .. }) => DeepContents {
                 kind: summary.title.clone(),
@@ -230,6 +272,10 @@ impl DeepCatalog {
             Stock::Indexes(indexes) => indexes.iter().map(|index| &*index.path).collect(),
             Stock::Areas(database) => database.files().collect(),
             Stock::Tables(tables) => tables.files.iter().map(|file| &**file).collect(),
+            #[cfg(feature = "archive")]
+            Stock::Parquet(tables) => tables.files().collect(),
+            #[cfg(feature = "archive")]
+            Stock::Hats(hats) => hats.files().collect(),
             Stock::Wide(_) | Stock::Stored(_) => vec![&self.path],
         };
         let mut state = Xxh3::new();
@@ -270,6 +316,14 @@ impl DeepCatalog {
                 .map_err(|(path, error)| CatalogError::Deep { path, error })?,
             Stock::Wide(wide) => wide.stars.iter().copied().for_each(add),
             Stock::Tables(tables) => tables.stars().iter().copied().for_each(add),
+            #[cfg(feature = "archive")]
+            Stock::Parquet(tables) => tables
+                .stars_in(&region, interrupt, &mut add)
+                .map_err(|(path, error)| CatalogError::Deep { path, error })?,
+            #[cfg(feature = "archive")]
+            Stock::Hats(hats) => hats
+                .stars_in(&region, interrupt, &mut add)
+                .map_err(|(path, error)| CatalogError::Deep { path, error })?,
             Stock::Stored(stored) => stored.catalog()?.stars().iter().copied().for_each(add),
         }
         Ok(brightest.into_stars())
@@ -291,18 +345,59 @@ impl Stock {
             let index = IndexFile::open(path, file).map_err(damaged)?;
             return Ok(Some(Self::Indexes(vec![index])));
         }
+        if head.starts_with(PARQUET_MAGIC) {
+            return Self::of_table(path).map_err(damaged);
+        }
         if path.extension().is_some_and(|ending| ending == "001") {
             let wide = WideDatabase::read(&file).map_err(damaged)?;
             return Ok(wide.map(Self::Wide));
         }
         Ok(StoredCatalog::of_head(path, &head).map(Self::Stored))
     }
+
+    #[cfg(feature = "archive")]
+    fn of_table(path: &Path) -> Result<Option<Self>, Damage> {
+        let tables = Tables::of(ParquetFile::open(path)?);
+        Ok(Some(Self::Parquet(tables)))
+    }
+
+    #[cfg(not(feature = "archive"))]
+    fn of_table(_: &Path) -> Result<Option<Self>, Damage> {
+        let found =
+            "the form of Parquet (this starpipe was built without Parquet: its feature `archive`)";
+        Err(Damage::Unsupported(found.to_owned()))
+    }
+}
+
+/// The catalogue of a HATS directory; of another one those of the directories in it.
+#[cfg(feature = "archive")]
+fn hats_in(path: &Path) -> Result<Vec<Hats>, CatalogError> {
+    let open =
+        |path: &Path| Hats::open(path).map_err(|(path, error)| CatalogError::Deep { path, error });
+    if let Some(hats) = open(path)? {
+        return Ok(vec![hats]);
+    }
+    let found = directories_in(path)?.into_iter();
+    found.filter_map(|path| open(&path).transpose()).collect()
+}
+
+/// Adds files to those with the same columns.
+#[cfg(feature = "archive")]
+fn join(found: &mut Vec<Stock>, tables: Tables) {
+    let mut left = Some(tables);
+    for stock in found.iter_mut() {
+        if let Stock::Parquet(others) = stock {
+            left = left.and_then(|tables| others.join(tables));
+        }
+    }
+    found.extend(left.map(Stock::Parquet));
 }
 
 /// Whether a file of a directory may be one that has a catalogue alone, by its ending: others are not opened.
 fn may_be_one(path: &Path) -> bool {
-    const ENDINGS: [&str; 11] = [
+    const ENDINGS: [&str; 12] = [
         "fits", "fit", "fts", "001", "cat", "csv", "tsv", "ecsv", "vot", "votable", "xml",
+        "parquet",
     ];
     let name = path.file_name().and_then(|name| name.to_str());
     let name = name.unwrap_or_default().to_ascii_lowercase();

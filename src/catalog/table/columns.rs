@@ -2,11 +2,13 @@
 
 use super::headings::{Heading, HeadingUnit, find_column};
 use super::roles::{Epoch, IdColumns, MagnitudeColumns, MotionColumns, PositionColumns};
+#[cfg(feature = "archive")]
+use crate::catalog::Band;
 use crate::catalog::error::RecordLocation;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The columns of a table by what they hold.
-pub(super) struct GeneralColumns {
+pub(in crate::catalog) struct GeneralColumns {
     /// The headings as in the file.
     pub(super) texts: Vec<String>,
     pub(super) id: IdColumns,
@@ -25,7 +27,7 @@ impl GeneralColumns {
     ///
     /// # Errors
     /// The missing columns; none if the table does not seem to be one of stars.
-    pub(super) fn find(
+    pub(in crate::catalog) fn find(
         headings: &[Heading],
         note_of: impl Fn(&str) -> Option<String>,
     ) -> Result<Self, Vec<&'static str>> {
@@ -67,7 +69,7 @@ impl GeneralColumns {
     }
 
     /// The columns used, for people.
-    pub(super) fn description(&self) -> String {
+    pub(in crate::catalog) fn description(&self) -> String {
         let text = |cell: usize| self.texts[cell].as_str();
         let id: Vec<&str> = self.id.cells.iter().map(|&cell| text(cell)).collect();
         let motion = match &self.motion {
@@ -92,7 +94,7 @@ impl GeneralColumns {
     }
 
     /// Where in a row the identifier is, and its heading.
-    pub(super) fn id_location(&self) -> (RecordLocation, String) {
+    pub(in crate::catalog) fn id_location(&self) -> (RecordLocation, String) {
         let cell = self
             .id
             .cells
@@ -106,5 +108,70 @@ impl GeneralColumns {
     pub(super) fn has_decimal_degrees(&self) -> bool {
         let decimal = !self.sexagesimal_seen.load(Ordering::Relaxed);
         decimal && matches!(self.position.ra.unit, None | Some(HeadingUnit::Degrees))
+    }
+}
+
+/// What readers of other tables than text ask.
+#[cfg(feature = "archive")]
+impl GeneralColumns {
+    /// The cells of which a star is made, its name left out; some may be there twice.
+    pub fn used_cells(&self) -> Vec<usize> {
+        let mut cells = self.id.cells.clone();
+        cells.extend([self.position.ra.cell, self.position.dec.cell]);
+        match self.magnitude {
+            MagnitudeColumns::Johnson { observed, derived } => {
+                cells.push(observed);
+                cells.extend(derived);
+            }
+            MagnitudeColumns::Tycho { bt, vt } => {
+                cells.push(vt);
+                cells.extend(bt);
+            }
+            MagnitudeColumns::Gaia { g, color } => {
+                cells.push(g);
+                cells.extend(color.cells());
+            }
+            MagnitudeColumns::Approximate { cell, .. } => cells.push(cell),
+        }
+        cells.extend(self.b_minus_v);
+        if let Some(motion) = &self.motion {
+            cells.extend([motion.ra, motion.dec]);
+        }
+        cells.extend(self.epoch_cell());
+        cells
+    }
+
+    /// The cells of right ascension and declination, and the degrees in the unit of their numbers.
+    pub fn position_cells(&self) -> [(usize, f64); 2] {
+        [&self.position.ra, &self.position.dec].map(|column| {
+            let unit = column.unit.unwrap_or(HeadingUnit::Degrees);
+            (column.cell, unit.to_degrees(1.0))
+        })
+    }
+
+    /// The headings as in the file.
+    pub fn texts(&self) -> &[String] {
+        &self.texts
+    }
+
+    /// The bands of the magnitudes.
+    pub const fn band(&self) -> Band {
+        self.magnitude.band()
+    }
+
+    /// The cell of the epoch, if each row has its own.
+    pub const fn epoch_cell(&self) -> Option<usize> {
+        match self.epoch {
+            Epoch::Column(cell) => Some(cell),
+            Epoch::Year(_) => None,
+        }
+    }
+
+    /// The epoch of all rows, if they have the same.
+    pub const fn epoch_year(&self) -> Option<f64> {
+        match self.epoch {
+            Epoch::Column(_) => None,
+            Epoch::Year(year) => Some(year),
+        }
     }
 }

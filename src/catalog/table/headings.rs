@@ -31,7 +31,7 @@ impl HeadingUnit {
 }
 
 /// A heading of a column.
-pub(super) struct Heading {
+pub(in crate::catalog) struct Heading {
     /// As in the file.
     pub(super) text: String,
     /// In lower case, without the unit.
@@ -42,7 +42,7 @@ pub(super) struct Heading {
 
 impl Heading {
     /// The heading `text`, with its unit in the line below, or empty.
-    pub(super) fn new(text: &str, unit_below: &str) -> Self {
+    pub(in crate::catalog) fn new(text: &str, unit_below: &str) -> Self {
         let text = unquoted(text);
         let (label, bracket) = match text.split_once(['(', '[']) {
             Some((label, bracket)) if !label.is_empty() => (label, bracket),

@@ -20,5 +20,11 @@ mod row;
 mod sky2000;
 mod votable;
 
+#[cfg(feature = "archive")]
+pub(super) use columns::GeneralColumns;
+#[cfg(feature = "archive")]
+pub(super) use headings::Heading;
 pub(super) use reader::CatalogTable;
+#[cfg(feature = "archive")]
+pub(super) use row::GeneralRow;
 pub(super) use votable::{VotableText, is_votable};

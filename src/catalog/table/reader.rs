@@ -6,12 +6,12 @@ use super::headings::Heading;
 use super::plausibility::{look_like_hours, look_swapped};
 use super::row::GeneralRow;
 use super::sky2000::Sky2000Columns;
-use crate::catalog::CatalogError;
 use crate::catalog::error::{RecordError, RecordLocation, quoted};
 use crate::catalog::import::{
     ImportRows, ImportTally, NamedStar, Parsed, Rejection, Row, RowParser,
 };
 use crate::catalog::sky2000::StarColumn;
+use crate::catalog::{Band, CatalogError};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io::BufRead;
@@ -92,11 +92,13 @@ impl CatalogTable {
         })
     }
 
-    /// Whether its magnitudes are Gaia's.
-    pub(in crate::catalog) fn is_of_gaia(&self) -> bool {
+    /// The bands of its magnitudes, if these are Gaia's.
+    pub(in crate::catalog) fn gaia_band(&self) -> Option<Band> {
         match &self.columns {
-            CatalogColumns::Sky2000(..) => false,
-            CatalogColumns::General(columns) => columns.magnitude.are_of_gaia(),
+            CatalogColumns::General(columns) if columns.magnitude.are_of_gaia() => {
+                Some(columns.magnitude.band())
+            }
+            CatalogColumns::General(..) | CatalogColumns::Sky2000(..) => None,
         }
     }
 

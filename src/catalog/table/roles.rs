@@ -2,8 +2,8 @@
 
 use super::headings::{Heading, HeadingUnit, find_column};
 use crate::base::angle::decimal;
-use crate::catalog::gaia;
 use crate::catalog::star::J2000_YEAR;
+use crate::catalog::{Band, gaia};
 use std::ops::RangeInclusive;
 
 /// The heading of the right ascension that VizieR computes for J2000, at any epoch of the
@@ -237,6 +237,20 @@ impl MagnitudeColumns {
             let cell = column(labels)?;
             Some(Self::Approximate { cell, band })
         })
+    }
+
+    /// The bands that they hold.
+    pub(super) const fn band(&self) -> Band {
+        match self {
+            Self::Johnson { .. } => Band::JohnsonV,
+            Self::Tycho { .. } => Band::Tycho,
+            Self::Gaia {
+                color: ColorColumns::Unknown,
+                ..
+            } => Band::GaiaG,
+            Self::Gaia { .. } => Band::GaiaColors,
+            Self::Approximate { .. } => Band::Unknown,
+        }
     }
 
     /// Whether they are Gaia's.

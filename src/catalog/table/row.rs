@@ -21,15 +21,15 @@ use std::ops::RangeInclusive;
 use std::sync::atomic::Ordering;
 
 /// The cells of a row.
-pub(super) struct GeneralRow<'a> {
-    pub(super) columns: &'a GeneralColumns,
-    pub(super) line: u64,
-    pub(super) cells: &'a [Cow<'a, str>],
+pub(in crate::catalog) struct GeneralRow<'a> {
+    pub(in crate::catalog) columns: &'a GeneralColumns,
+    pub(in crate::catalog) line: u64,
+    pub(in crate::catalog) cells: &'a [Cow<'a, str>],
 }
 
 impl GeneralRow<'_> {
     /// Parses the star and its name.
-    pub(super) fn star(&self) -> Parsed<NamedStar> {
+    pub(in crate::catalog) fn star(&self) -> Parsed<NamedStar> {
         let columns = self.columns;
         let position = self.position()?;
         let (id, mut name) = self.id(position)?;

@@ -9,7 +9,8 @@ use crate::catalog::{Catalog, CatalogError, Star, StarFlags, StarId, StarIndex};
 const SAME_RAD: f64 = 3.0 * RAD_PER_ARCSEC;
 const SAME_MAG: f32 = 1.5;
 
-/// The stars of a region: `deep` ones of an epoch, and those of `known` beside them. A star of both has the
+/// The stars of a region: `deep` ones, of an epoch unless their proper motion is known, and those of `known` beside
+/// them. A star of both has the
 /// position of the deep one, and the name, the magnitude and the color of the other.
 pub fn merged(
     title: String,
@@ -48,22 +49,26 @@ fn height(star: &Star) -> f64 {
 
 /// The place among `deep`, by declination, of the star that is nearest to a known one, if it may be the same.
 fn same_as(star: &Star, deep: &[Star], years: f64) -> Option<usize> {
-    let there = star.direction_at(years);
-    let from = deep.partition_point(|other| height(other) < there.as_vector().z - SAME_RAD);
+    let (now, there) = (star.direction, star.direction_at(years));
+    let heights = [now.as_vector().z, there.as_vector().z];
+    let lowest = heights[0].min(heights[1]) - SAME_RAD;
+    let highest = heights[0].max(heights[1]) + SAME_RAD;
+    let from = deep.partition_point(|other| height(other) < lowest);
     let near = deep[from..]
         .iter()
-        .take_while(|other| height(other) <= there.as_vector().z + SAME_RAD);
+        .take_while(|other| height(other) <= highest);
     let limit = chord_of(SAME_RAD).powi(2);
-    let distance_sq =
-        |other: &Star| (other.direction.as_vector() - there.as_vector()).norm_squared();
+    let distance_sq = |other: &Star| {
+        // With proper motion it is where it was at the epoch of the known stars.
+        let expected = match other.flags.contains(StarFlags::NO_PROPER_MOTION) {
+            true => &there,
+            false => &now,
+        };
+        (other.direction.as_vector() - expected.as_vector()).norm_squared()
+    };
     near.enumerate()
         .filter(|(_, other)| (other.v_mag - star.v_mag).abs() < SAME_MAG)
-        .filter(|(_, other)| {
-            matches!(
-                other.id,
-                StarId::Place(_) | StarId::Gaia(_) | StarId::Tycho(_)
-            )
-        })
+        .filter(|(_, other)| !matches!(other.id, StarId::Skymap(_)))
         .map(|(place, other)| (from + place, distance_sq(other)))
         .filter(|(_, distance_sq)| *distance_sq <= limit)
         .min_by(|a, b| a.1.total_cmp(&b.1))
@@ -104,6 +109,28 @@ mod tests {
     fn deep_star(ra_deg: f64, dec_deg: f64, v_mag: f32) -> Star {
         let direction = at(ra_deg, dec_deg);
         Star::new(StarId::Place(PlaceId::of(&direction)), direction, v_mag)
+    }
+
+    #[test]
+    fn a_deep_star_with_proper_motion_is_compared_at_the_epoch_of_the_known_ones() {
+        let motion = |star: Star| Star {
+            pm_dec_mas_per_yr: 1000.0,
+            flags: StarFlags::NONE,
+            ..star
+        };
+        let fast = motion(Star::new(StarId::Skymap(7), at(20.0, 30.0), 6.0));
+        let known = Catalog::new("known", vec![fast], Vec::new()).unwrap();
+        let deep = motion(deep_star(20.0, 30.0 + 0.5 / 3600.0, 6.1));
+        let region = Region {
+            centre: at(20.0, 30.0),
+            radius_rad: RAD_PER_DEG,
+            per_sq_deg: 100.0,
+        };
+        let title = "both".to_owned();
+        let both = merged(title, vec![deep], Some(2016.0), &known, &region).unwrap();
+        assert_eq!(both.stars().len(), 1);
+        assert_eq!(both.stars()[0].id, fast.id);
+        assert_eq!(both.stars()[0].direction, deep.direction);
     }
 
     #[test]

@@ -177,7 +177,7 @@ fn sweep(known: Option<[f64; 2]>, deep: &DeepContents) -> Vec<Attempt> {
 mod tests {
     use super::*;
     use crate::base::coords::UnitVector;
-    use crate::catalog::deep::Band;
+    use crate::catalog::Band;
     use crate::identify::{Scale, ScalePrior};
 
     const SIZE: Size = Size {

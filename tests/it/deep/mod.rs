@@ -8,4 +8,5 @@ mod patch;
 mod reading;
 #[cfg(target_os = "linux")]
 mod sparse;
+mod sweep;
 mod tables;

@@ -6,7 +6,7 @@ use crate::base::coords::UnitVector;
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
-use crate::catalog::deep::band::Band;
+use crate::catalog::Band;
 use crate::catalog::deep::error::Damage;
 use crate::catalog::deep::region::Region;
 use crate::catalog::star::rounded_mag;

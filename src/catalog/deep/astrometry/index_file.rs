@@ -6,7 +6,7 @@ use crate::base::coords::{Icrs, UnitVector};
 use crate::base::file_ranges::FileRanges;
 use crate::base::interrupt::Interrupt;
 use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
-use crate::catalog::deep::band::Band;
+use crate::catalog::Band;
 use crate::catalog::deep::error::Damage;
 use crate::catalog::deep::fits_tables::{Column, FitsTable, Rows, read_tables};
 use crate::catalog::deep::healpix::{HealpixCell, samples};

@@ -1,6 +1,6 @@
 //! The V magnitude of a star by the table beside the tree.
 
-use crate::catalog::deep::band::Band;
+use crate::catalog::Band;
 use crate::catalog::deep::fits_tables::{Column, FitsTable};
 use crate::catalog::gaia;
 use crate::catalog::star::rounded_mag;
