@@ -76,7 +76,7 @@ pub fn read_until(path: &Path, interrupt: &Interrupt) -> Result<LoadedCatalog, C
 /// no records.
 pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
     let deep = DeepCatalog::find(path)?;
-    if let Some(deep) = deep.into_iter().next() {
+    if let Some(deep) = deep.first() {
         return import_deep(deep);
     }
     let reading = read(path)?;
@@ -87,11 +87,10 @@ pub fn import(path: &Path) -> Result<LoadedCatalog, CatalogError> {
 }
 
 /// Reads all stars of a catalogue that is otherwise read region by region.
-fn import_deep(deep: DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
-    let deep = match deep.into_loaded() {
-        Ok(loaded) => return Ok(loaded),
-        Err(deep) => deep,
-    };
+fn import_deep(deep: &DeepCatalog) -> Result<LoadedCatalog, CatalogError> {
+    if let Some(loaded) = deep.loaded() {
+        return Ok(loaded.clone());
+    }
     let contents = deep.contents();
     if contents.stars > MAX_RECORDS {
         let (path, limit) = (deep.path().to_owned(), MAX_RECORDS);

@@ -52,7 +52,7 @@ struct RecommendArgs {
     starpipe catalog import tycho2/ -o tycho2.cat\n  \
     starpipe catalog import hipparcos.tsv -o hipparcos.cat\n\n\
     Formats, plain or gzip, recognized from the content: SKY2000 records; the files of Tycho-2 (tyc2.dat*, \
-    suppl_1.dat), one or a directory of them; tables, CSV or TSV, with a heading for each of identifier (id, \
+    suppl_1.dat), one or a directory of them; tables, CSV, TSV or VOTable, with a heading for each of identifier (id, \
     hip, tyc, source_id, name, ...), position (ra and dec, raj2000 and dej2000, ra_hours, ... in degrees or \
     as 05:34:48.0), magnitude (vmag, mag, vtmag, phot_g_mean_mag, ...) and, if available, proper \
     motion (pmra, pmdec in mas a year) and epoch (ref_epoch).")]
@@ -141,7 +141,7 @@ fn described(path: &str, contents: &DeepContents, range_v_mag: Option<[f32; 2]>)
 }
 
 /// Catalogues that people have: density of their stars, and where to get them.
-const KNOWN: [(f64, &str); 7] = [
+const KNOWN: [(f64, &str); 8] = [
     (7.3, "SKY2000, built in"),
     (
         45.4,
@@ -151,6 +151,10 @@ const KNOWN: [(f64, &str); 7] = [
     (
         61.6,
         "Tycho-2 of the CDS, 530 MB: https://cdsarc.cds.unistra.fr/ftp/I/259",
+    ),
+    (
+        400.0,
+        "Gaia DR3 to G 14 around your target, CSV or VOTable: https://gea.esac.esa.int/archive",
     ),
     (
         500.0,
@@ -188,8 +192,8 @@ fn recommend(fov_deg: f64) -> String {
             "No catalog in use has enough stars for a field of {fov_deg}°; the densest is enough for {narrowest_deg:.2}°.\n"
         );
     }
-    text + "Catalogs in STARPIPE_CATALOGS, in starpipe/catalogs in the user's folder for data, and those that astrometry.net \
-            and ASTAP have installed are found without an option; others with --catalog PATH.\n"
+    text + "Catalogs in STARPIPE_CATALOGS, in starpipe/catalogs in the user's folder for data, in share/starpipe/catalogs, and \
+            those that astrometry.net and ASTAP have installed are found without an option; others with --catalog PATH.\n"
 }
 
 fn import(arguments: &ImportArgs) -> Result<CommandOutput, CommandError> {

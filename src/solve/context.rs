@@ -2,6 +2,7 @@
 
 use super::deep::DeepSky;
 use super::fixed_camera::FixedCamera;
+use super::limits::FrameLimits;
 use super::pointing_buffers::PointingBuffers;
 use super::stopwatch::Stage;
 use crate::base::clock::{ClockDate, UtcOffset};
@@ -209,16 +210,6 @@ pub struct Workspace {
     /// Also due at the deadline of the frame.
     of_frame: Interrupt,
     paused: Paused,
-}
-
-/// When the work on a frame is to end.
-pub struct FrameLimits {
-    /// When all work is.
-    pub of_all: Interrupt,
-    /// The same, or at the deadline of the frame.
-    pub of_frame: Interrupt,
-    /// Time that does not count for the frame.
-    pub paused: Paused,
 }
 
 impl Workspace {

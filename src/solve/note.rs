@@ -73,12 +73,7 @@ pub enum Note {
         pixel_scale_rad: [f64; 2],
     },
     /// The frame's centre is not where it was stated to be.
-    OtherDirection {
-        /// Distance of the centre from the stated direction, in radians.
-        distance_rad: f64,
-        /// Largest distance that was stated, in radians.
-        radius_rad: f64,
-    },
+    OtherDirection(OtherDirection),
     /// Site, date and attitude contradict each other: the centre was below the horizon.
     BelowHorizon {
         /// How far below, in radians.
@@ -172,7 +167,7 @@ impl Note {
             Self::MoreStars { .. } => "more_stars",
             Self::RoundPicture(_) => "round_picture",
             Self::WrongHeaderScale { .. } => "header_scale_wrong",
-            Self::OtherDirection { .. } => "direction_wrong",
+            Self::OtherDirection(_) => "direction_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::SiteOrTime(_) => "site_or_time_wrong",
             Self::ZoneAssumed => "time_zone_assumed",
@@ -281,10 +276,11 @@ impl Note {
         let (stated, found) = (other_than?, outcome.identification()?);
         let distance_rad = found.icrs_to_camera.boresight().angle_to(&stated.centre);
         let radius_rad = stated.radius_rad;
-        (distance_rad > radius_rad).then_some(Self::OtherDirection {
+        let direction = OtherDirection {
             distance_rad,
             radius_rad,
-        })
+        };
+        (distance_rad > radius_rad).then_some(Self::OtherDirection(direction))
     }
 
     /// What the names of an identified frame are where attitude and optics alone were wanted.
@@ -439,6 +435,27 @@ impl Note {
     }
 }
 
+/// Where a frame's centre is from the direction that was stated for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtherDirection {
+    /// Distance of the centre from that direction, in radians.
+    pub distance_rad: f64,
+    /// Largest distance that was stated, in radians.
+    pub radius_rad: f64,
+}
+
+impl fmt::Display for OtherDirection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the frame's center is {:.1}° from the given direction, beyond the radius of {:.2}°: the direction was not \
+             used",
+            self.distance_rad * DEG_PER_RAD,
+            self.radius_rad * DEG_PER_RAD
+        )
+    }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -467,16 +484,7 @@ impl fmt::Display for Note {
                 write_other_size(f, *known_px, *found_px)
             }
             Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
-            Self::OtherDirection {
-                distance_rad,
-                radius_rad,
-            } => write!(
-                f,
-                "the frame's center is {:.1}° from the given direction, beyond the radius of {:.2}°: the direction \
-                 was not used",
-                distance_rad * DEG_PER_RAD,
-                radius_rad * DEG_PER_RAD
-            ),
+            Self::OtherDirection(direction) => direction.fmt(f),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
                 "site, date and attitude contradict each other: the center of the frame would be {:.1}° \

@@ -2,7 +2,7 @@
 
 use super::bodies::find_bodies;
 use super::context::{Context, Workspace};
-use super::deep::{Answered, InAll, identify_in_all};
+use super::deep::{Answered, identify_in_all};
 use super::identification::{SecondImages, identified, observation, search, through_air_or_not};
 use super::note::Note;
 use super::outcome::Outcome;
@@ -93,20 +93,12 @@ pub fn solve_centroids(
     };
     let known = (context, priors);
     let identify = |context: &Context, priors: &Priors| search.identify(context, priors);
-    let InAll {
-        answer,
-        named: deep,
-        other_than,
-    } = identify_in_all(known, frame.size, &limits, identify);
-    let ConfirmedPlaceTime {
-        mut outcome,
-        priors,
-        place_time,
-        ..
-    } = answer;
+    let in_all = identify_in_all(known, frame.size, &limits, identify);
+    let (deep, answer) = (in_all.named, in_all.answer);
+    let (mut outcome, place_time) = (answer.outcome, answer.place_time);
     let usual = context.indexed.catalog();
     let catalog = deep.as_ref().map_or(usual, |deep| deep.catalog());
-    let priors = &priors;
+    let priors = &answer.priors;
     let second_images = SecondImages::find(&mut outcome, context.attitude_only, || {
         list.star_field_in(frame.size, priors.places())
     });
@@ -123,7 +115,7 @@ pub fn solve_centroids(
         .map(Note::RowsLeftOut)
         .chain(unknown)
         .chain(Note::of_guessed_size(&frame, found))
-        .chain(Note::of_direction(other_than.as_ref(), &outcome))
+        .chain(Note::of_direction(in_all.other_than.as_ref(), &outcome))
         .chain(Note::of_place_time(place_time.as_ref()))
         .chain(Note::of_observation(observation.as_ref(), priors, &outcome))
         .chain(second_images.double.map(Note::DoubleImage))

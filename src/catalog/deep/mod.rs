@@ -259,10 +259,10 @@ impl DeepCatalog {
     }
 
     /// All of it, where it is held in memory.
-    pub(super) fn into_loaded(self) -> Result<LoadedCatalog, Self> {
-        match self.stock {
-            Stock::Tables(tables) => Ok(tables.loaded),
-            stock => Err(Self { stock, ..self }),
+    pub(super) fn loaded(&self) -> Option<&LoadedCatalog> {
+        match &self.stock {
+            Stock::Tables(tables) => Some(&tables.loaded),
+            _ => None,
         }
     }
 

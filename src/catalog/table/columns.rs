@@ -23,19 +23,21 @@ pub(in crate::catalog) struct GeneralColumns {
 }
 
 impl GeneralColumns {
-    /// Finds the columns from `headings`. `note_of` gives what the file says about a column.
+    /// Finds the columns from `headings`. `note_of` gives what the file says about a column. Without identifiers, a star
+    /// may be called by its place in tables of Gaia, and in others that may lack them.
     ///
     /// # Errors
     /// The missing columns; none if the table does not seem to be one of stars.
     pub(in crate::catalog) fn find(
         headings: &[Heading],
         note_of: impl Fn(&str) -> Option<String>,
+        may_lack_ids: bool,
     ) -> Result<Self, Vec<&'static str>> {
         let magnitude = MagnitudeColumns::find(headings);
         let is_of_gaia = magnitude
             .as_ref()
             .is_some_and(MagnitudeColumns::are_of_gaia);
-        let id = IdColumns::find(headings, is_of_gaia)
+        let id = IdColumns::find(headings, is_of_gaia, may_lack_ids)
             .ok_or("of identifiers (id, name, hip, tyc, source_id, ...)");
         let position = PositionColumns::find(headings)
             .ok_or("of right ascensions and declinations (ra and dec, raj2000 and dej2000, ...)");

@@ -158,7 +158,7 @@ impl CatalogColumns {
         let headings: Vec<Heading> = headings
             .map(|(label, unit)| Heading::new(label, unit))
             .collect();
-        let columns = GeneralColumns::find(&headings, |label| notes.get(label).cloned())?;
+        let columns = GeneralColumns::find(&headings, |label| notes.get(label).cloned(), false)?;
         Ok(Self::General(Box::new(columns)))
     }
 }

@@ -34,8 +34,8 @@ pub(super) enum IdKind {
 }
 
 impl IdColumns {
-    /// A table of Gaia needs none.
-    pub(super) fn find(headings: &[Heading], is_of_gaia: bool) -> Option<Self> {
+    /// Where there are none, and there may be none, the place stands for them.
+    pub(super) fn find(headings: &[Heading], is_of_gaia: bool, may_lack: bool) -> Option<Self> {
         /// Headings of identifiers, in order of preference.
         const IDENTIFIERS: [(&str, IdKind); 11] = [
             ("skymap skymap_number", IdKind::Skymap),
@@ -59,16 +59,23 @@ impl IdColumns {
                 cells: vec![region, star, component],
             });
         }
+        let places = || Self {
+            kind: IdKind::Place,
+            cells: Vec::new(),
+        };
         if is_of_gaia {
-            let source = column("source_id").or_else(|| column("source designation"));
-            return Some(Self {
-                kind: source.map_or(IdKind::Place, |_| IdKind::Gaia),
-                cells: source.into_iter().collect(),
-            });
+            let source = column("source_id source designation");
+            return Some(source.map_or_else(places, |source| Self {
+                kind: IdKind::Gaia,
+                cells: vec![source],
+            }));
         }
-        let (kind, cell) = IDENTIFIERS
+        let known = IDENTIFIERS
             .iter()
-            .find_map(|(labels, kind)| Some((*kind, column(labels)?)))?;
+            .find_map(|(labels, kind)| Some((*kind, column(labels)?)));
+        let Some((kind, cell)) = known else {
+            return may_lack.then(places);
+        };
         // In a table with SKY2000's own columns, `ID` is the Skymap number.
         let is_sky2000 = column("vder id_merg sky2000").is_some();
         let is_skymap = is_sky2000 && headings[cell].label == "id";

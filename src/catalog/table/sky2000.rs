@@ -77,5 +77,5 @@ impl Sky2000Columns {
 
 fn has_other_position(labels: &[Cow<str>]) -> bool {
     let headings: Vec<Heading> = labels.iter().map(|label| Heading::new(label, "")).collect();
-    GeneralColumns::find(&headings, |_| None).is_ok()
+    GeneralColumns::find(&headings, |_| None, false).is_ok()
 }

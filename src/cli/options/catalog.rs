@@ -18,8 +18,9 @@ use std::path::PathBuf;
 #[command(next_help_heading = "Resources")]
 pub(crate) struct CatalogOptions {
     /// Star catalog to use in place of the built-in one: SKY2000, Tycho-2 (a directory of its
-    /// files), a table (CSV, TSV, from VizieR), or a file written by `starpipe catalog import`,
-    /// which loads fastest
+    /// files), a table (CSV, TSV, VOTable), or a file written by `starpipe catalog import`, which loads
+    /// fastest. Or one to use beside it for narrow fields: files of astrometry.net or ASTAP, or tables of
+    /// Gaia (CSV, VOTable, Parquet, HATS)
     #[arg(long, value_name = "PATH")]
     catalog: Option<PathBuf>,
     /// Directory in which the index of the catalog is kept [default: $STARPIPE_CACHE_DIR, else

@@ -9,7 +9,8 @@ use crate::identify::diagnosis::Diagnosis;
 use crate::identify::{
     Identification, LOG10_FALSE_ALARM_LIMIT, Priors, ScalePrior, SearchFailure, SkyRegion,
 };
-use crate::solve::context::{Context, FrameLimits};
+use crate::solve::context::Context;
+use crate::solve::limits::FrameLimits;
 use crate::solve::outcome::{Outcome, Reason};
 
 /// What an identification answers.

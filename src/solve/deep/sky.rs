@@ -7,7 +7,7 @@ use crate::base::units::{DEG_PER_RAD, RAD_PER_DEG};
 use crate::catalog::deep::{DeepCatalog, DeepContents, Region, SkyZone};
 use crate::catalog::{Catalog, CatalogError};
 use crate::identify::{IndexedCatalog, MIN_STARS, SearchedPart};
-use crate::solve::context::FrameLimits;
+use crate::solve::limits::FrameLimits;
 use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;

@@ -21,7 +21,7 @@ impl Layout {
         let (leaves, headings): (Vec<usize>, Vec<Heading>) = columns
             .map(|(leaf, column)| (leaf, Heading::new(column.name(), "")))
             .unzip();
-        let found = GeneralColumns::find(&headings, |_| None);
+        let found = GeneralColumns::find(&headings, |_| None, true);
         let columns = found.map_err(|mut missing| {
             if missing.is_empty() {
                 missing.push("of positions and magnitudes of stars");
