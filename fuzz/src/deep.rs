@@ -8,12 +8,15 @@ use starpipe::catalog::Star;
 use starpipe::catalog::deep::{DeepCatalog, DeepContents, Region};
 
 /// Names of files, by whose endings their kinds are told.
-const NAMES: [&str; 5] = [
+const NAMES: [&str; 8] = [
     "pieces.fits",
     "deep.fits",
     "d05_0101.290",
     "d80_0101.1476",
     "w08_0101.001",
+    "gaia.csv",
+    "gaia.vot",
+    "gaia.parquet",
 ];
 /// Stars in a square degree that are wanted at most.
 const PER_SQ_DEG: f64 = 10.0;

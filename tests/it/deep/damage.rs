@@ -3,6 +3,7 @@
 use super::areas;
 use super::index_file::{Series, index_file};
 use super::patch::Patch;
+use super::tables::Form;
 use proptest::prelude::*;
 use starpipe::base::interrupt::Interrupt;
 use starpipe::catalog::deep::{DeepCatalog, Region};
@@ -29,6 +30,27 @@ fn read_all(path: &Path) -> Result<usize, String> {
             .len();
     }
     Ok(stars)
+}
+
+#[test]
+fn truncated_tables_say_so() {
+    let patch = Patch::draw([10.0, 10.0], 1.0, 300.0, 5);
+    let folder = tempfile::tempdir().unwrap();
+    for form in [Form::TableData, Form::Binary, Form::Binary2, Form::Parquet] {
+        let path = folder.path().join(form.file_name());
+        form.write(&path, &patch);
+        let whole = fs::read(&path).unwrap();
+        assert!(read_all(&path).unwrap() > 20);
+        for percent in [40, 70, 99] {
+            fs::write(&path, &whole[..whole.len() * percent / 100]).unwrap();
+            let error = read_all(&path).unwrap_err();
+            let words = ["cut off", "truncated", "damaged", "ends", "end of"];
+            assert!(
+                words.iter().any(|word| error.contains(word)),
+                "{form:?} {percent}: {error}"
+            );
+        }
+    }
 }
 
 fn index() -> Vec<u8> {

@@ -200,6 +200,16 @@ fn the_report_names_the_catalogue_that_was_used() {
         catalog.contains("astrometry.net") && catalog.contains("SKY2000"),
         "{catalog}"
     );
+    // Other commands say that it is not for them.
+    let mut calibrate = starpipe();
+    calibrate.args(["calibrate", "fixtures/orion/orion.png", "--catalog"]);
+    let ran = Ran::new(calibrate.arg(&index));
+    assert_eq!(ran.status, 1);
+    assert!(
+        ran.stderr.contains("starpipe catalog import"),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
