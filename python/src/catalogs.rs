@@ -72,7 +72,7 @@ pub fn deep(key: &Key, prefix: &Path) -> PyResult<Option<&'static DeepSky>> {
     };
     let mut known = DEEP.lock().unwrap_or_else(PoisonError::into_inner);
     let known = known.get_or_insert_default().entry((paths, cache));
-    let kept: &'static DeepSky = *known.or_insert_with(|| &*Box::leak(Box::new(made)));
+    let kept: &'static DeepSky = known.or_insert_with(|| &*Box::leak(Box::new(made)));
     Ok(Some(kept))
 }
 

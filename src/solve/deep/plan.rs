@@ -140,10 +140,16 @@ fn near_attempt(near: SkyRegion, fov_range_rad: [f64; 2], aspect: f64) -> Attemp
     }
 }
 
-/// The search of the whole sky, part by part; nothing where the fields are too narrow for the catalogue, or wide.
+/// The search of the whole sky, part by part; nothing where the fields are too narrow for the catalogue, or wide, or
+/// where it has too many stars to read them all.
 fn sweep(known: Option<[f64; 2]>, deep: &DeepContents) -> Vec<Attempt> {
     /// The index of a level has fields up to so many times the narrowest, where they are known.
     const WIDTHS: f64 = 3.0;
+    /// Of more, as all of Gaia, reading alone takes hours.
+    const MOST: u64 = 500_000_000;
+    if deep.stars > MOST {
+        return Vec::new();
+    }
     let level = Level::of(known.map(|[low, _]| low), deep);
     // Here and there it has more stars than on average.
     let narrowest_rad = BELOW_NARROWEST * deep.narrowest_fov_deg() * RAD_PER_DEG;
@@ -230,6 +236,7 @@ mod tests {
         assert!(attempts(&of_fov(3.0), SIZE, &tycho2()).is_empty());
         assert!(attempts(&of_fov(0.2), SIZE, &tycho2()).is_empty());
         assert!(attempts(&of_fov(0.05), SIZE, &contents(5000.0, 1.0)).is_empty());
+        assert!(attempts(&of_fov(0.3), SIZE, &contents(43_000.0, 1.0)).is_empty());
         assert!(!is_narrow(&of_fov(12.0), 1500.0));
         assert!(is_narrow(&of_fov(1.0), 1500.0));
         assert!(!is_narrow(&Priors::default(), 1500.0));

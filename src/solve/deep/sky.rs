@@ -16,6 +16,9 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 /// Version of the stars in the cache: it changes with what is read of catalogues, and with how stars are chosen.
 const STARS_VERSION: u32 = 2;
 
+/// To index fewer costs nothing to speak of.
+const TOLD_STARS: f64 = 200_000.0;
+
 /// How far an index of the whole sky, or of a part, is built.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -297,7 +300,7 @@ impl DeepSky {
         };
         let path = self.path_of_stars(making);
         let kept = path.as_deref().and_then(|path| Catalog::read(path).ok());
-        let tells = kept.is_none() && !is_told;
+        let tells = kept.is_none() && !is_told && making.sweep.stars > TOLD_STARS;
         let catalog = match kept {
             Some(kept) => kept,
             None => {

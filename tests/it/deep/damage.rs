@@ -7,15 +7,21 @@ use super::tables::Form;
 use proptest::prelude::*;
 use starpipe::base::interrupt::Interrupt;
 use starpipe::catalog::deep::{DeepCatalog, Region};
+use std::error::Error;
 use std::fs;
 use std::path::Path;
 
 /// Reads all that is in a path. Whatever it is, this must not panic.
 fn read_all(path: &Path) -> Result<usize, String> {
     let text = |error: starpipe::catalog::CatalogError| {
-        let error = error.to_string();
-        assert!(!error.is_empty() && error.contains(&path.display().to_string()[..4]));
-        error
+        let mut words = error.to_string();
+        let mut cause = error.source();
+        while let Some(error) = cause {
+            words += &format!(": {error}");
+            cause = error.source();
+        }
+        assert!(words.contains(&path.display().to_string()[..4]), "{words}");
+        words
     };
     let mut stars = 0;
     for deep in DeepCatalog::find(path).map_err(text)? {
