@@ -104,8 +104,15 @@ impl Rows {
         Ok(file.read(at(rows.start)..at(rows.end))?)
     }
 
-    /// All rows, one after the other.
+    /// All rows, one after the other, of a table that has few.
     pub fn read_all(&self, file: &FileRanges) -> Result<Vec<u8>, Damage> {
+        /// A hundred times those of the largest tree of stars.
+        const MOST_BYTES: u64 = 1 << 28;
+        let bytes = self.count.saturating_mul(self.bytes as u64);
+        if bytes > MOST_BYTES {
+            let message = format!("a table of {bytes} bytes where {MOST_BYTES} are the most");
+            return Err(Damage::Invalid(message));
+        }
         self.read(file, 0..self.count)
     }
 }
