@@ -37,6 +37,15 @@ impl HealpixCell {
         }
     }
 
+    /// The cell of twice its width that holds it.
+    pub const fn parent(self) -> Self {
+        Self {
+            face: self.face,
+            x: self.x / 2,
+            y: self.y / 2,
+        }
+    }
+
     /// Its number in the scheme of astrometry.net: face by face, x by x.
     pub const fn number_by_face(self, side: u32) -> u32 {
         (self.face * side + self.x) * side + self.y
@@ -100,15 +109,6 @@ impl HealpixCell {
             face: (number >> (2 * order)) as u32,
             x: even_bits(within),
             y: even_bits(within >> 1),
-        }
-    }
-
-    /// The cell of twice its width that holds it.
-    pub const fn parent(self) -> Self {
-        Self {
-            face: self.face,
-            x: self.x / 2,
-            y: self.y / 2,
         }
     }
 
