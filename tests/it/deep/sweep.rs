@@ -10,7 +10,7 @@ use starpipe::catalog::deep::DeepCatalog;
 use starpipe::solve::{DeepProgress, DeepSky};
 use std::f64::consts::TAU;
 
-/// Eight million stars make an index of twelve parts: one minute and 1 GB.
+/// Eight million stars make an index of twelve parts.
 #[test]
 #[ignore = "takes minutes and 3 GB"]
 fn fields_of_a_third_of_a_degree_are_found_in_twelve_parts_of_the_sky() {
@@ -42,7 +42,7 @@ fn fields_of_a_third_of_a_degree_are_found_in_twelve_parts_of_the_sky() {
         let centre = stars[random.random_range(0..STARS)].direction;
         let near = stars
             .iter()
-            .filter(|star| star.direction.angle_to(&centre) < 0.01);
+            .filter(|star| star.direction.angle_to(&centre) < 0.05);
         let patch = Patch {
             centre,
             stars: near.copied().collect(),
