@@ -60,20 +60,30 @@ pub fn open(key: Key, interrupt: &Interrupt) -> PyResult<&'static IndexedCatalog
 /// is stated, those that are installed, by packages of Python below `prefix`, too.
 pub fn deep(key: &Key, prefix: &Path) -> PyResult<Option<&'static DeepSky>> {
     let cache = key.1.clone().or_else(cache_directory);
-    let (paths, made) = match &key.0 {
+    let paths = match &key.0 {
+        Some(path) => vec![path.clone()],
+        None => installed_paths_below(prefix),
+    };
+    if paths.is_empty() {
+        return Ok(None);
+    }
+    let mut known = DEEP.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = known.get_or_insert_default();
+    let deep_key = (paths, cache);
+    if let Some(kept) = known.get(&deep_key) {
+        return Ok(Some(kept));
+    }
+    let (paths, cache) = deep_key.clone();
+    let made = match &key.0 {
         Some(path) => match DeepCatalog::find(path).map_err(exception)? {
             found if found.is_empty() => return Ok(None),
-            found => (vec![path.clone()], DeepSky::new(found, cache.clone())),
+            found => DeepSky::new(found, cache),
         },
-        None => match installed_paths_below(prefix) {
-            paths if paths.is_empty() => return Ok(None),
-            paths => (paths.clone(), DeepSky::installed(paths, cache.clone())),
-        },
+        None => DeepSky::installed(paths, cache),
     };
-    let mut known = DEEP.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = known.get_or_insert_default().entry((paths, cache));
-    let kept: &'static DeepSky = known.or_insert_with(|| &*Box::leak(Box::new(made)));
-    Ok(Some(kept))
+    let made: &'static DeepSky = Box::leak(Box::new(made));
+    known.insert(deep_key, made);
+    Ok(Some(made))
 }
 
 /// The catalogue in a file, or the built-in one.
