@@ -57,6 +57,7 @@
 //! | [`mod@track`] | where does the camera point now: from frame to frame |
 //! | `annotate` | what is in a frame: names by the pose, constellations, one sentence |
 //! | [`report`] | how to present it: JSON, text, tables, overlays, world coordinates |
+//! | `doors` | what do other solvers' callers ask and read: solve-field, ASTAP, nova.astrometry.net |
 //! | `night` | what does a night of one camera show: its series, and what changes when |
 //! | `store` | results of many frames: runs that can be resumed, and their tables |
 //! | [`lab`] | is it good enough: simulated frames, validation, robustness, defocus, the papers' experiments |
@@ -80,6 +81,8 @@ pub mod camera;
 pub mod catalog;
 pub mod centroids;
 pub mod detect;
+#[doc(hidden)]
+pub mod doors;
 pub mod ephemeris;
 pub mod frame;
 pub mod identify;

@@ -1,4 +1,5 @@
-//! The first word of the command line: a command, or frames for `process`; and which suite `validate` runs.
+//! The first word of the command line: a command, or frames for `process`; and which suite `validate` runs. The
+//! name by which the program is called may stand for a command, too.
 
 use clap::Command;
 use clap::error::ErrorKind;
@@ -15,6 +16,13 @@ const SYNONYMS: [(&str, &str); 8] = [
     ("solve", "process"),
     ("solve-field", "process"),
     ("generate", "simulate"),
+];
+
+/// Names of other solvers by which the program may be called, and the commands that answer in their place.
+const OTHER_PROGRAMS: [(&str, &str); 3] = [
+    ("solve-field", "solve-field"),
+    ("astap", "astap"),
+    ("astap_cli", "astap"),
 ];
 
 const VALIDATE: &str = "validate";
@@ -40,6 +48,10 @@ pub(crate) fn completed(
     program: &mut Command,
 ) -> Result<Vec<OsString>, clap::Error> {
     let mut words: Vec<OsString> = words.collect();
+    if let Some(command) = words.first().and_then(|name| other_program(name)) {
+        words.insert(1, command.into());
+        return Ok(words);
+    }
     let Some(first) = words.get(1) else {
         return Ok(words);
     };
@@ -56,6 +68,15 @@ pub(crate) fn completed(
         }
     }
     Ok(words)
+}
+
+/// The command that answers in place of the solver by whose name the program is called.
+fn other_program(called: &OsStr) -> Option<&'static str> {
+    let name = Path::new(called).file_stem()?;
+    let mut known = OTHER_PROGRAMS.iter();
+    known
+        .find(|(other, _)| name == *other)
+        .map(|(_, command)| *command)
 }
 
 /// The words of `validate`; with `--suite NAME` those of `validate-NAME`, which has the suite's own options.

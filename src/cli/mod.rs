@@ -14,6 +14,7 @@ mod catalog;
 mod command;
 mod darks;
 mod defocus;
+mod doors;
 mod exit;
 mod experiment;
 mod first_word;

@@ -103,6 +103,8 @@ pub enum ScaleSource {
     Camera,
     /// The frame's header: tried first, and dropped where nothing matches with it.
     Header,
+    /// A program that calls this one, for its user: tried first, and dropped where nothing matches with it.
+    Program,
 }
 
 /// When a frame was taken, and who states it.
@@ -240,6 +242,15 @@ impl ScalePrior {
             scale: Scale::Pixel(pixel_scale_rad),
             tolerance: NOMINAL_TOLERANCE,
             source: ScaleSource::Header,
+        }
+    }
+
+    /// The same from a program that calls this one: tried first, and dropped where nothing matches with it.
+    #[must_use]
+    pub const fn tried_first(self) -> Self {
+        Self {
+            source: ScaleSource::Program,
+            ..self
         }
     }
 

@@ -149,7 +149,7 @@ fn black(hot_pixels: usize) -> String {
 
 fn too_narrow(fov_x_rad: [f64; 2], source: ScaleSource, narrowest_rad: f64, stars: f64) -> String {
     let stated = match source {
-        ScaleSource::User => "that was given",
+        ScaleSource::User | ScaleSource::Program => "that was given",
         ScaleSource::Camera => "from the camera description",
         ScaleSource::Header => "from the file's header",
     };

@@ -67,9 +67,11 @@ pub enum Note {
     },
     /// The sky of a frame that is not identified fills a circle, as by an all-sky lens.
     RoundPicture(Circle),
-    /// The scale in the header is not that of the frame.
-    WrongHeaderScale {
-        /// Smallest and largest pixel scale that the header allows, in radians.
+    /// A scale that was tried first is not that of the frame.
+    OtherScale {
+        /// Whether the frame's header gives it, or else the program that calls.
+        is_of_header: bool,
+        /// Smallest and largest pixel scale that it allows, in radians.
         pixel_scale_rad: [f64; 2],
     },
     /// The frame's centre is not where it was stated to be.
@@ -166,7 +168,10 @@ impl Note {
             Self::ColorMosaic(_) => "color_mosaic",
             Self::MoreStars { .. } => "more_stars",
             Self::RoundPicture(_) => "round_picture",
-            Self::WrongHeaderScale { .. } => "header_scale_wrong",
+            Self::OtherScale {
+                is_of_header: true, ..
+            } => "header_scale_wrong",
+            Self::OtherScale { .. } => "scale_wrong",
             Self::OtherDirection(_) => "direction_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::SiteOrTime(_) => "site_or_time_wrong",
@@ -260,13 +265,14 @@ impl Note {
         (!columns.is_empty()).then_some(Self::DefectiveColumns(columns))
     }
 
-    /// A scale from the header that had to be dropped, where it is not the true one.
+    /// A scale that was tried first and had to be dropped, where it is not the true one.
     pub(super) fn of_scale(dropped: Option<ScalePrior>, outcome: &Outcome) -> Option<Self> {
-        let scale = dropped.filter(|scale| scale.source == ScaleSource::Header)?;
+        let scale = dropped.filter(|scale| scale.source != ScaleSource::Camera)?;
         let found = outcome.identification()?;
         let [low_rad, high_rad] = scale.pixel_scale_range_rad(found.camera.width_px);
         let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px()));
-        is_wrong.then_some(Self::WrongHeaderScale {
+        is_wrong.then_some(Self::OtherScale {
+            is_of_header: scale.source == ScaleSource::Header,
             pixel_scale_rad: [low_rad, high_rad],
         })
     }
@@ -483,7 +489,10 @@ impl fmt::Display for Note {
             Self::LensOfOtherSize { known_px, found_px } => {
                 write_other_size(f, *known_px, *found_px)
             }
-            Self::WrongHeaderScale { pixel_scale_rad } => write_header_scale(f, *pixel_scale_rad),
+            Self::OtherScale {
+                is_of_header,
+                pixel_scale_rad,
+            } => write_other_scale(f, *is_of_header, *pixel_scale_rad),
             Self::OtherDirection(direction) => direction.fmt(f),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
@@ -560,12 +569,18 @@ fn write_guessed_size(
     )
 }
 
-fn write_header_scale(f: &mut fmt::Formatter<'_>, pixel_scale_rad: [f64; 2]) -> fmt::Result {
+fn write_other_scale(
+    f: &mut fmt::Formatter<'_>,
+    is_of_header: bool,
+    pixel_scale_rad: [f64; 2],
+) -> fmt::Result {
     let [low, high] = pixel_scale_rad.map(|rad| rad * ARCSEC_PER_RAD);
-    write!(
-        f,
-        "the header's focal length and pixel size do not fit this frame: they give {low:.1}″ to {high:.1}″ per pixel"
-    )
+    if is_of_header {
+        f.write_str("the header's focal length and pixel size do not fit this frame: they give ")?;
+    } else {
+        f.write_str("the scale that was given does not fit this frame: it is ")?;
+    }
+    write!(f, "{low:.1}″ to {high:.1}″ per pixel")
 }
 
 fn write_double(f: &mut fmt::Formatter<'_>, double: &DoubleImage) -> fmt::Result {

@@ -107,12 +107,7 @@ fn cards(frame: &str, solution: &Solution, row_order: RowOrder) -> Option<FitsHe
         return None;
     };
     let mut header = FitsHeader::default();
-    let view = SkyView {
-        camera: &identification.camera,
-        icrs_to_camera: &identification.icrs_to_camera,
-        places: identification.places,
-    };
-    add_projection(&mut header, &view, row_order);
+    add_projection(&mut header, &view_of(identification), row_order);
     add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
         let utc = known.date.to_iso();
@@ -130,61 +125,116 @@ pub fn is_header(file: &[u8]) -> bool {
 
 /// Adds the mapping from a file's pixels to the directions of the catalogue.
 pub fn add_projection(header: &mut FitsHeader, view: &SkyView, row_order: RowOrder) {
-    let SkyView { camera, places, .. } = view;
-    let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
-    let plane = Plane::from_camera(camera);
-    let reference = if camera.is_pinhole() {
-        camera.centre()
-    } else {
-        camera.axis()
-    };
-    let is_plain = camera.is_pinhole() && camera.distortion().is_none() && places.are_of_catalog();
-    let place = |direction: &UnitVector<Camera>| {
-        let apparent = view.icrs_to_camera.inverse().apply(direction);
-        plane.place_of(&icrs_to_camera.apply(&places.astrometric(&apparent)))
-    };
-    let sip = (!is_plain)
-        .then(|| Sip::new(camera, &reference, place))
-        .flatten();
-    let (sip, rows) = match row_order {
-        RowOrder::TopDown => (sip, 1.0),
-        RowOrder::BottomUp => (sip.as_ref().map(Sip::with_rows_reversed), -1.0),
-    };
-    let reversal = Matrix2::new(1.0, 0.0, 0.0, rows);
-    let (boresight, _) = icrs_to_camera.boresight_and_up();
-    let (ra_rad, dec_rad) = boresight.to_ra_dec();
-    let (east, north) = sky_axes(icrs_to_camera);
-    let pinhole = Matrix2::from_rows(&[east, north]) * mirror(camera) / camera.focal_length_px()
-        * DEG_PER_RAD;
-    let linear = sip
-        .as_ref()
-        .map_or_else(Matrix2::identity, |sip| sip.linear);
-    let cd = pinhole * reversal * linear;
-    let suffix = if sip.is_some() { "-SIP" } else { "" };
-    let row = match row_order {
-        RowOrder::TopDown => reference.y,
-        RowOrder::BottomUp => camera.height_px - 1.0 - reference.y,
-    };
-    header.integer("WCSAXES", 2, "");
-    let (code, name) = plane.code_and_name();
-    header.text("CTYPE1", &format!("RA---{code}{suffix}"), name);
-    header.text("CTYPE2", &format!("DEC--{code}{suffix}"), "");
-    header.text("CUNIT1", "deg", "");
-    header.text("CUNIT2", "deg", "");
-    header.real("CRVAL1", ra_rad * DEG_PER_RAD, "RA of the boresight");
-    header.real("CRVAL2", dec_rad * DEG_PER_RAD, "Dec of the boresight");
-    header.real("CRPIX1", reference.x + 1.0, "first pixel is 1");
-    header.real("CRPIX2", row + 1.0, "first pixel is 1");
-    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        let keyword = format!("CD{}_{}", row + 1, column + 1);
-        header.real(&keyword, cd[(row, column)], "degrees a pixel");
+    Mapping::new(view, row_order).add_to(header);
+}
+
+/// The linear part of a frame's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearWcs {
+    /// Right ascension and declination of the reference point, in degrees.
+    pub crval_deg: [f64; 2],
+    /// Its pixel in the file, the first being (1, 1).
+    pub crpix: [f64; 2],
+    /// From offsets in pixels to degrees to the east (first row) and north.
+    pub cd_deg: [[f64; 2]; 2],
+}
+
+/// The linear part of the coordinates that [`header`] writes; `None` where the frame is not identified.
+pub fn linear(solution: &Solution) -> Option<LinearWcs> {
+    let found = solution.outcome.identification()?;
+    let mapping = Mapping::new(&view_of(found), solution.row_order.unwrap_or_default());
+    Some(mapping.linear)
+}
+
+fn view_of(found: &Identification) -> SkyView<'_> {
+    SkyView {
+        camera: &found.camera,
+        icrs_to_camera: &found.icrs_to_camera,
+        places: found.places,
     }
-    plane.add_to(header);
-    header.real("LONPOLE", 180.0, "");
-    header.text("RADESYS", "ICRS", "");
-    header.real("EQUINOX", 2000.0, "");
-    if let Some(sip) = &sip {
-        add_sip(header, sip);
+}
+
+/// The mapping from a file's pixels to the directions of the catalogue.
+struct Mapping {
+    plane: Plane,
+    linear: LinearWcs,
+    sip: Option<Sip>,
+}
+
+impl Mapping {
+    fn new(view: &SkyView, row_order: RowOrder) -> Self {
+        let SkyView { camera, places, .. } = view;
+        let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
+        let plane = Plane::from_camera(camera);
+        let reference = if camera.is_pinhole() {
+            camera.centre()
+        } else {
+            camera.axis()
+        };
+        let is_plain =
+            camera.is_pinhole() && camera.distortion().is_none() && places.are_of_catalog();
+        let place = |direction: &UnitVector<Camera>| {
+            let apparent = view.icrs_to_camera.inverse().apply(direction);
+            plane.place_of(&icrs_to_camera.apply(&places.astrometric(&apparent)))
+        };
+        let sip = (!is_plain)
+            .then(|| Sip::new(camera, &reference, place))
+            .flatten();
+        let (sip, rows) = match row_order {
+            RowOrder::TopDown => (sip, 1.0),
+            RowOrder::BottomUp => (sip.as_ref().map(Sip::with_rows_reversed), -1.0),
+        };
+        let reversal = Matrix2::new(1.0, 0.0, 0.0, rows);
+        let (boresight, _) = icrs_to_camera.boresight_and_up();
+        let (ra_rad, dec_rad) = boresight.to_ra_dec();
+        let (east, north) = sky_axes(icrs_to_camera);
+        let pinhole = Matrix2::from_rows(&[east, north]) * mirror(camera)
+            / camera.focal_length_px()
+            * DEG_PER_RAD;
+        let distorted = sip
+            .as_ref()
+            .map_or_else(Matrix2::identity, |sip| sip.linear);
+        let cd = pinhole * reversal * distorted;
+        let row = match row_order {
+            RowOrder::TopDown => reference.y,
+            RowOrder::BottomUp => camera.height_px - 1.0 - reference.y,
+        };
+        let linear = LinearWcs {
+            crval_deg: [ra_rad, dec_rad].map(|rad| rad * DEG_PER_RAD),
+            crpix: [reference.x + 1.0, row + 1.0],
+            cd_deg: [[cd[(0, 0)], cd[(0, 1)]], [cd[(1, 0)], cd[(1, 1)]]],
+        };
+        Self { plane, linear, sip }
+    }
+
+    fn add_to(&self, header: &mut FitsHeader) {
+        let LinearWcs {
+            crval_deg,
+            crpix,
+            cd_deg,
+        } = self.linear;
+        let suffix = if self.sip.is_some() { "-SIP" } else { "" };
+        header.integer("WCSAXES", 2, "");
+        let (code, name) = self.plane.code_and_name();
+        header.text("CTYPE1", &format!("RA---{code}{suffix}"), name);
+        header.text("CTYPE2", &format!("DEC--{code}{suffix}"), "");
+        header.text("CUNIT1", "deg", "");
+        header.text("CUNIT2", "deg", "");
+        header.real("CRVAL1", crval_deg[0], "RA of the boresight");
+        header.real("CRVAL2", crval_deg[1], "Dec of the boresight");
+        header.real("CRPIX1", crpix[0], "first pixel is 1");
+        header.real("CRPIX2", crpix[1], "first pixel is 1");
+        for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let keyword = format!("CD{}_{}", row + 1, column + 1);
+            header.real(&keyword, cd_deg[row][column], "degrees a pixel");
+        }
+        self.plane.add_to(header);
+        header.real("LONPOLE", 180.0, "");
+        header.text("RADESYS", "ICRS", "");
+        header.real("EQUINOX", 2000.0, "");
+        if let Some(sip) = &self.sip {
+            add_sip(header, sip);
+        }
     }
 }
 

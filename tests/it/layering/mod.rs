@@ -116,6 +116,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
+    ("doors", &["base", "identify", "report", "solve"]),
     (
         "night",
         &[

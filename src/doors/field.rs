@@ -1,0 +1,51 @@
+//! The field of an identified frame, in the terms of astrometry.net.
+
+use crate::base::units::DEG_PER_RAD;
+use crate::report::wcs;
+use crate::solve::Solution;
+
+/// The field of an identified frame, in the terms of astrometry.net. Orientation and parity are those of the
+/// file's rows, the first of them at the bottom, as FITS has it.
+///
+/// # Reference
+/// astrometry.net 0.97, `util/sip.c`: `tan_pixel_scale`, `tan_get_orientation`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Field {
+    /// Right ascension and declination of the frame's centre, in degrees.
+    pub centre_deg: [f64; 2],
+    /// Width and height, in degrees: the pixel scale times the frame's sides.
+    pub size_deg: [f64; 2],
+    /// Pixel scale at the centre, in arcseconds.
+    pub pixel_scale_arcsec: f64,
+    /// Position angle of the direction to later rows, from north through east, in degrees.
+    pub orientation_deg: f64,
+    /// Whether east and north are seen as in a mirror: the determinant of `CD` is positive.
+    pub is_mirrored: bool,
+}
+
+impl Field {
+    /// The field of a frame; `None` where it is not identified.
+    pub fn new(solution: &Solution) -> Option<Self> {
+        let found = solution.outcome.identification()?;
+        let [[xx, xy], [yx, yy]] = wcs::linear(solution)?.cd_deg;
+        let determinant = xx * yy - xy * yx;
+        let parity = if determinant < 0.0 { -1.0 } else { 1.0 };
+        let orientation_rad = -libm::atan2(parity * yx - xy, parity * xx + yy);
+        let scale_deg = determinant.abs().sqrt();
+        let apparent = found.apparent_direction_of(&found.camera.centre())?;
+        let (ra_rad, dec_rad) = found.places.astrometric(&apparent).to_ra_dec();
+        Some(Self {
+            centre_deg: [ra_rad * DEG_PER_RAD, dec_rad * DEG_PER_RAD],
+            size_deg: [solution.width, solution.height].map(|side| side as f64 * scale_deg),
+            pixel_scale_arcsec: scale_deg * 3600.0,
+            orientation_deg: orientation_rad * DEG_PER_RAD,
+            is_mirrored: determinant > 0.0,
+        })
+    }
+
+    /// Half the field's diagonal, in degrees.
+    pub fn radius_deg(&self) -> f64 {
+        let [width, height] = self.size_deg;
+        0.5 * libm::hypot(width, height)
+    }
+}
