@@ -8,7 +8,7 @@ use crate::base::interrupt::Interrupt;
 use crate::base::units::{RAD_PER_DEG, WHOLE_SKY_SQ_DEG};
 use crate::catalog::Band;
 use crate::catalog::deep::error::Damage;
-use crate::catalog::deep::fits_tables::{Column, FitsTable, Rows, read_tables};
+use crate::base::fits_tables::{Column, FitsTable, Rows, read_tables};
 use crate::catalog::deep::healpix::{HealpixCell, samples};
 use crate::catalog::deep::region::Region;
 use crate::catalog::star::{J2000_YEAR, MAG_LIMIT, PM_LIMIT_MAS_PER_YR, rounded_mag};

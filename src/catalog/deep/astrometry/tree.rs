@@ -9,7 +9,7 @@
 
 use crate::base::file_ranges::FileRanges;
 use crate::catalog::deep::error::Damage;
-use crate::catalog::deep::fits_tables::{Cards, FitsTable, Rows};
+use crate::base::fits_tables::{Cards, FitsTable, Rows};
 use nalgebra::Vector3;
 use std::ops::Range;
 
