@@ -127,7 +127,12 @@ mod tests {
             let length = text.len().next_multiple_of(2880);
             format!("{text:<length$}").into_bytes()
         };
-        let mut bytes = unit(&["SIMPLE  = T", "BITPIX  = 8", "NAXIS   = 0", "IMAGEW  = 1024"]);
+        let mut bytes = unit(&[
+            "SIMPLE  = T",
+            "BITPIX  = 8",
+            "NAXIS   = 0",
+            "IMAGEW  = 1024",
+        ]);
         let count = format!("NAXIS2  = {}", rows.len());
         bytes.extend(unit(&[
             "XTENSION= 'BINTABLE'",
@@ -182,7 +187,10 @@ mod tests {
         assert_eq!((list.centroids[1].mag, list.centroids[1].flux), (7.0, None));
         assert_eq!((list.width, list.height), (Some(1024), Some(900)));
         options.is_ascending = false;
-        assert_eq!(options.read(file.path()).unwrap().centroids[0].flux, Some(9.0));
+        assert_eq!(
+            options.read(file.path()).unwrap().centroids[0].flux,
+            Some(9.0)
+        );
     }
 
     #[test]
