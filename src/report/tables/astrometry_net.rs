@@ -8,7 +8,6 @@
 
 use super::fits_table;
 use crate::base::table::{Column, columns};
-use crate::base::units::{ARCSEC_PER_RAD, DEG_PER_RAD};
 use crate::frame::FitsHeader;
 use crate::report::{FrameReport, StarReport, wcs};
 use crate::solve::Solution;
@@ -53,14 +52,14 @@ struct XylsRow {
 
 /// An identification.
 struct MatchRow {
-    ra: f64,
-    dec: f64,
     radius: f64,
-    scale: f64,
-    parity: bool,
     nmatch: u64,
+    ndistract: u64,
+    nconflict: u64,
     nfield: u64,
     nindex: u64,
+    wcs_valid: bool,
+    parity: bool,
     logodds: f64,
 }
 
@@ -166,18 +165,26 @@ pub(super) fn index_xyls(report: &FrameReport, solution: &Solution) -> Vec<u8> {
 pub(super) fn matched(report: &FrameReport, solution: &Solution) -> Vec<u8> {
     let columns: Vec<Column<MatchRow>> = columns! {
         MatchRow:
-        ra, "deg", "", "right ascension of the centre";
-        dec, "deg", "", "declination of the centre";
         radius, "deg", "", "half the diagonal";
-        scale, "arcsec/pix", "", "pixel scale";
-        parity, "", "", "whether the image is mirrored";
         nmatch, "", "", "identified detections";
+        ndistract, "", "", "others";
+        nconflict, "", "", "none";
         nfield, "", "", "detections";
         nindex, "", "", "stars";
+        wcs_valid, "", "", "whether there are coordinates";
+        parity, "", "", "whether the image is mirrored";
         logodds, "", "", "natural logarithm of the odds that this is no chance";
     };
     let names = [
-        "RA", "DEC", "RADIUS", "SCALE", "PARITY", "NMATCH", "NFIELD", "NINDEX", "LOGODDS",
+        "RADIUS",
+        "NMATCH",
+        "NDISTRACT",
+        "NCONFLICT",
+        "NFIELD",
+        "NINDEX",
+        "WCS_VALID",
+        "PARITY",
+        "LOGODDS",
     ];
     let columns = in_capitals(columns, &names);
     let rows: Vec<MatchRow> = match_row(report, solution).into_iter().collect();
@@ -186,21 +193,20 @@ pub(super) fn matched(report: &FrameReport, solution: &Solution) -> Vec<u8> {
 
 fn match_row(report: &FrameReport, solution: &Solution) -> Option<MatchRow> {
     let found = solution.outcome.identification()?;
-    let apparent = found.apparent_direction_of(&found.camera.centre())?;
-    let (ra_rad, dec_rad) = found.places.astrometric(&apparent).to_ra_dec();
     let [[xx, xy], [yx, yy]] = wcs::linear(solution)?.cd_deg;
     let determinant = xx * yy - xy * yx;
-    let scale_deg = determinant.abs().sqrt();
+    let diagonal_px = libm::hypot(report.width as f64, report.height as f64);
     let stars = found.matches.len() as u64;
+    let detections = solution.sources.len() as u64;
     Some(MatchRow {
-        ra: ra_rad * DEG_PER_RAD,
-        dec: dec_rad * DEG_PER_RAD,
-        radius: 0.5 * scale_deg * libm::hypot(report.width as f64, report.height as f64),
-        scale: scale_deg * ARCSEC_PER_RAD / DEG_PER_RAD,
-        parity: determinant > 0.0,
+        radius: 0.5 * diagonal_px * determinant.abs().sqrt(),
         nmatch: stars,
-        nfield: solution.sources.len() as u64,
+        ndistract: detections.saturating_sub(stars),
+        nconflict: 0,
+        nfield: detections,
         nindex: stars,
+        wcs_valid: true,
+        parity: determinant > 0.0,
         logodds: -LN_10 * found.log10_false_alarm,
     })
 }

@@ -33,9 +33,11 @@ const FLAGS: [(Option<char>, &str); 11] = [
 ];
 
 /// Others with a value.
-const VALUES: [(Option<char>, &str); 39] = [
+const VALUES: [(Option<char>, &str); 41] = [
     (Some('b'), "backend-config"),
     (None, "config"),
+    (None, "index-dir"),
+    (None, "index-file"),
     (None, "plot-scale"),
     (None, "plot-bg"),
     (Some('Z'), "kmz"),
