@@ -8,6 +8,7 @@ pub mod epoch;
 pub(crate) mod exponential;
 pub(crate) mod file_ranges;
 pub mod files;
+pub(crate) mod fits_tables;
 pub(crate) mod fits_types;
 pub mod format;
 pub mod interrupt;

@@ -48,7 +48,7 @@ impl CentroidListError {
         })
     }
 
-    fn of_list(problem: impl Into<String>) -> Self {
+    pub(super) fn of_list(problem: impl Into<String>) -> Self {
         Self {
             line: None,
             problem: problem.into(),

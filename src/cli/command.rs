@@ -6,6 +6,7 @@ use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
+use super::doors::SolveFieldArgs;
 use super::experiment::ExperimentArgs;
 use super::flats::FlatsArgs;
 use super::identify::IdentifyArgs;
@@ -107,6 +108,8 @@ pub(crate) enum Command {
     Darks(DarksArgs),
     /// Make a master flat from flat-field frames, and measure the gain and the pixel response
     Flats(FlatsArgs),
+    /// Solve images and lists of centroids as solve-field of astrometry.net does: its options, lines and files
+    SolveField(Box<SolveFieldArgs>),
     #[cfg(feature = "shell")]
     /// Write a script that completes commands and options in a shell
     Completions(CompletionsArgs),

@@ -7,14 +7,13 @@ use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 /// First words that mean a command, as other programs or people call it.
-const SYNONYMS: [(&str, &str); 8] = [
+const SYNONYMS: [(&str, &str); 7] = [
     ("analyze", "process"),
     ("detect", "process"),
     ("measure", "process"),
     ("plate-solve", "process"),
     ("platesolve", "process"),
     ("solve", "process"),
-    ("solve-field", "process"),
     ("generate", "simulate"),
 ];
 

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
-const SHOWN: [(&str, [&[&str]; 2]); 14] = [
+const SHOWN: [(&str, [&[&str]; 2]); 15] = [
     ("process", [&["dark", "mask", "draw"], &SOLVING]),
     ("sky", [&["dark", "flat", "mask"], &SOLVING]),
     (
@@ -43,6 +43,30 @@ const SHOWN: [(&str, [&[&str]; 2]); 14] = [
         [
             &["count", "seed", "stars", "missing", "sweep", "plot"],
             &["format", "threads"],
+        ],
+    ),
+    (
+        "solve-field",
+        [
+            &[
+                "dir",
+                "out",
+                "wcs",
+                "new_fits",
+                "overwrite",
+                "scale_low",
+                "scale_high",
+            ],
+            &[
+                "scale_units",
+                "ra",
+                "dec",
+                "radius",
+                "cpulimit",
+                "width",
+                "height",
+                "catalog",
+            ],
         ],
     ),
     ("limit", [&[], &STUDY]),

@@ -1,5 +1,6 @@
 //! The field of an identified frame, in the terms of astrometry.net.
 
+use crate::base::coords::PixelPoint;
 use crate::base::units::DEG_PER_RAD;
 use crate::report::wcs;
 use crate::solve::Solution;
@@ -8,13 +9,15 @@ use crate::solve::Solution;
 /// file's rows, the first of them at the bottom, as FITS has it.
 ///
 /// # Reference
-/// astrometry.net 0.97, `util/sip.c`: `tan_pixel_scale`, `tan_get_orientation`.
+/// astrometry.net 0.93, `sip.c`: `tan_pixel_scale`, `tan_get_orientation`; `sip-utils.c`: `sip_get_field_size`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Field {
     /// Right ascension and declination of the frame's centre, in degrees.
     pub centre_deg: [f64; 2],
     /// Width and height, in degrees: the pixel scale times the frame's sides.
     pub size_deg: [f64; 2],
+    /// Width and height, in degrees, as angles on the sky from border to border through the centre.
+    pub extent_deg: [f64; 2],
     /// Pixel scale at the centre, in arcseconds.
     pub pixel_scale_arcsec: f64,
     /// Position angle of the direction to later rows, from north through east, in degrees.
@@ -32,11 +35,34 @@ impl Field {
         let parity = if determinant < 0.0 { -1.0 } else { 1.0 };
         let orientation_rad = -libm::atan2(parity * yx - xy, parity * xx + yy);
         let scale_deg = determinant.abs().sqrt();
-        let apparent = found.apparent_direction_of(&found.camera.centre())?;
-        let (ra_rad, dec_rad) = found.places.astrometric(&apparent).to_ra_dec();
+        let centre = found.camera.centre();
+        let seen = |x: f64, y: f64| {
+            let pixel = PixelPoint::new(centre.x + x, centre.y + y);
+            let apparent = found.apparent_direction_of(&pixel)?;
+            Some(found.places.astrometric(&apparent))
+        };
+        let middle = seen(0.0, 0.0)?;
+        let extent_rad = |x: f64, y: f64| {
+            let borders = [seen(-x, -y)?, seen(x, y)?];
+            let angles = borders.iter().map(|border| middle.angle_to(border));
+            Some(angles.sum::<f64>())
+        };
+        let sides = [solution.width, solution.height].map(|side| side as f64);
+        let size_deg = sides.map(|side| side * scale_deg);
+        let extents_rad = [
+            extent_rad(0.5 * sides[0], 0.0),
+            extent_rad(0.0, 0.5 * sides[1]),
+        ];
+        // Some lenses do not reach the borders of their frames.
+        let extent_deg = [0, 1].map(|axis| {
+            let extent_deg = extents_rad[axis].map(|rad| rad * DEG_PER_RAD);
+            extent_deg.unwrap_or(size_deg[axis])
+        });
+        let (ra_rad, dec_rad) = middle.to_ra_dec();
         Some(Self {
             centre_deg: [ra_rad * DEG_PER_RAD, dec_rad * DEG_PER_RAD],
-            size_deg: [solution.width, solution.height].map(|side| side as f64 * scale_deg),
+            size_deg,
+            extent_deg,
             pixel_scale_arcsec: scale_deg * 3600.0,
             orientation_deg: orientation_rad * DEG_PER_RAD,
             is_mirrored: determinant > 0.0,

@@ -7,6 +7,7 @@
 
 mod field;
 mod scale;
+pub mod solve_field;
 
 pub use field::Field;
 pub use scale::{ScaleRange, ScaleUnit};

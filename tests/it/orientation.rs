@@ -39,14 +39,14 @@ fn unit((ra_deg, dec_deg): (f64, f64)) -> [f64; 3] {
     [dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin()]
 }
 
-fn angle_deg(a: (f64, f64), b: (f64, f64)) -> f64 {
+pub fn angle_deg(a: (f64, f64), b: (f64, f64)) -> f64 {
     let (a, b) = (unit(a), unit(b));
     let chord_sq: f64 = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum();
     2.0 * (chord_sq.sqrt() / 2.0).asin().to_degrees()
 }
 
 /// The numbers of a FITS header by keyword.
-fn header(path: &Path) -> HashMap<String, f64> {
+pub fn header(path: &Path) -> HashMap<String, f64> {
     let bytes = fs::read(path).unwrap();
     assert_eq!(bytes.len() % 2880, 0);
     let cards = bytes
@@ -63,7 +63,7 @@ fn header(path: &Path) -> HashMap<String, f64> {
 
 /// The direction in degrees of the FITS pixel (x, y) by a header, by the formulas of the `TAN`
 /// projection and SIP.
-fn header_direction(header: &HashMap<String, f64>, x: f64, y: f64) -> (f64, f64) {
+pub fn header_direction(header: &HashMap<String, f64>, x: f64, y: f64) -> (f64, f64) {
     let value = |keyword: &str| header.get(keyword).copied().unwrap_or(0.0);
     let (u, v) = (x - value("CRPIX1"), y - value("CRPIX2"));
     let distortion = |name: &str| {

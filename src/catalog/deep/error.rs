@@ -29,6 +29,7 @@ impl From<io::Error> for Damage {
     fn from(error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::UnexpectedEof => Self::Truncated,
+            io::ErrorKind::InvalidData => Self::Invalid(error.to_string()),
             _ => Self::Unreadable(error),
         }
     }

@@ -17,7 +17,6 @@ mod contents;
 mod coverage;
 mod error;
 mod finding;
-mod fits_tables;
 mod healpix;
 mod installed;
 #[cfg(feature = "archive")]

@@ -1,12 +1,15 @@
 //! Command lines and protocols of other solvers, answered by the pipeline: what they ask → [`Question`] →
 //! solutions → their files and lines.
 
-#![allow(dead_code)] // until a door uses it
+mod solve_field;
+
+pub(crate) use solve_field::{SolveFieldArgs, solve_field};
 
 use super::exit::CommandError;
 use super::options::catalog::CatalogOptions;
-use super::solving::{InputSolver, Inputs, Sink, SolvingPlan};
+use super::solving::{InputSolver, Inputs, Sink, SolvedImage, SolvingPlan};
 use starpipe::catalog::Catalog;
+use starpipe::frame::ImageName;
 use starpipe::identify::{IndexedCatalog, ScalePrior};
 use starpipe::solve::{Context, DeepSky};
 use std::ops::ControlFlow;
@@ -34,14 +37,14 @@ impl Question {
         context
     }
 
-    /// Solves `paths`, and hands what the sink makes of the images of each to `take`, in their order. If `take`
+    /// Solves `paths`, and hands what `make` makes of the images of each to `take`, in their order. If `take`
     /// breaks, the remaining ones are skipped.
-    pub(super) fn answer<S: Sink>(
+    pub(super) fn answer<M: Send>(
         &self,
         catalog: &CatalogOptions,
         paths: &[impl AsRef<Path> + Sync],
-        sink: impl FnOnce(&Catalog) -> S,
-        take: impl FnMut(Vec<(String, anyhow::Result<S::Made>)>) -> ControlFlow<()>,
+        make: impl Fn(&ImageName, &SolvedImage, &Catalog) -> M + Sync,
+        take: impl FnMut(Vec<(String, anyhow::Result<M>)>) -> ControlFlow<()>,
     ) -> Result<(), CommandError> {
         catalog.with_deep(false, |pool, indexed, deep| {
             let solver = InputSolver {
@@ -49,10 +52,27 @@ impl Question {
                 inputs: &self.inputs,
                 context: self.context(indexed, deep),
                 memory: self.plan.memory,
-                sink: sink(indexed.catalog()),
+                sink: Make {
+                    make,
+                    catalog: indexed.catalog(),
+                },
             };
             solver.solve_all(paths, take);
             Ok(())
         })
+    }
+}
+
+/// Makes something of an image and the catalog that it was solved with.
+struct Make<'a, F> {
+    make: F,
+    catalog: &'a Catalog,
+}
+
+impl<M: Send, F: Fn(&ImageName, &SolvedImage, &Catalog) -> M + Sync> Sink for Make<'_, F> {
+    type Made = M;
+
+    fn make(&self, image: &ImageName, solved: &SolvedImage) -> M {
+        (self.make)(image, solved, self.catalog)
     }
 }

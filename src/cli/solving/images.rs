@@ -4,7 +4,8 @@ use crate::cli::input::centroid_list;
 use crate::cli::input::frames::read_frame;
 use crate::cli::input::stdin::is_stdin;
 use anyhow::Context as _;
-use starpipe::centroids::CentroidListOptions;
+use starpipe::CentroidList;
+use starpipe::centroids::{CentroidListOptions, XylistOptions};
 use starpipe::frame::{Buffers, Frame, FrameError, ImageName, PageChoice, Pages};
 use starpipe::solve::{
     Context, Error, Solution, Workspace, solve_centroids, solve_guarded, solve_read,
@@ -18,6 +19,8 @@ pub(crate) enum Inputs {
     Frames(PageChoice),
     /// Lists of centroids.
     Lists(CentroidListOptions),
+    /// Lists of centroids in FITS, as astrometry.net has them.
+    Xylists(XylistOptions),
 }
 
 impl Inputs {
@@ -71,7 +74,15 @@ impl<'a> Images<'a> {
             (RemainingInput::Nothing, _) => None,
             (RemainingInput::Pages(pages), _) => self.solve_page(pages, context, workspace),
             (RemainingInput::All, Inputs::Lists(options)) => {
-                Some((image, solve_list(self.path, options, context, workspace)))
+                let read = || centroid_list::read(self.path, options);
+                Some((image, solve_list(self.path, read, context, workspace)))
+            }
+            (RemainingInput::All, Inputs::Xylists(options)) => {
+                let read = || {
+                    let list = options.read(self.path);
+                    list.with_context(|| format!("reading {}", self.path.display()))
+                };
+                Some((image, solve_list(self.path, read, context, workspace)))
             }
             (RemainingInput::All, Inputs::Frames(PageChoice::All)) => {
                 workspace.begin(context);
@@ -120,12 +131,12 @@ fn solve_frame(
 
 fn solve_list(
     path: &Path,
-    options: &CentroidListOptions,
+    read: impl FnOnce() -> anyhow::Result<CentroidList>,
     context: &Context,
     workspace: &mut Workspace,
 ) -> anyhow::Result<SolvedImage> {
     solve_guarded(path, workspace, |workspace| {
-        let list = centroid_list::read(path, options)?;
+        let list = read()?;
         let solution = solve_centroids(&list, context, workspace)
             .with_context(|| format!("reading {}", path.display()))?;
         Ok(SolvedImage {

@@ -1,14 +1,17 @@
-//! Tables as astrometry.net writes them, for programs that read its results.
+//! Tables as astrometry.net writes them, for programs that read its results: `.corr`, `.rdls`, `.axy`,
+//! `-indx.xyls`, and of `.match` the columns of one number.
 //!
 //! Pixels count from 1, as in FITS, in the rows of the file.
 //!
 //! # Reference
-//! astrometry.net 0.97, `solve-field --corr` and `--rdls`.
+//! astrometry.net 0.93, `solve-field`: the files it writes.
 
 use super::fits_table;
 use crate::base::table::{Column, columns};
-use crate::report::{FrameReport, StarReport};
+use crate::frame::FitsHeader;
+use crate::report::{FrameReport, StarReport, wcs};
 use crate::solve::Solution;
+use std::f64::consts::LN_10;
 
 /// A detection and its star. Names are those of astrometry.net.
 #[derive(Debug, Default)]
@@ -31,6 +34,50 @@ struct CorrRow {
 struct RdlsRow {
     ra: f64,
     dec: f64,
+}
+
+/// A detection.
+struct AxyRow {
+    x: f64,
+    y: f64,
+    flux: Option<f64>,
+    background: Option<f64>,
+}
+
+/// The place of a star.
+struct XylsRow {
+    x: f64,
+    y: f64,
+}
+
+/// An identification.
+struct MatchRow {
+    radius: f64,
+    nmatch: u64,
+    ndistract: u64,
+    nconflict: u64,
+    nfield: u64,
+    nindex: u64,
+    wcs_valid: bool,
+    parity: bool,
+    logodds: f64,
+}
+
+/// The columns with names in capital letters.
+fn in_capitals<R>(columns: Vec<Column<R>>, names: &[&'static str]) -> Vec<Column<R>> {
+    let renamed = columns.into_iter().zip(names);
+    renamed
+        .map(|(column, &name)| Column { name, ..column })
+        .collect()
+}
+
+/// The size of the frame, and of what kind the table is.
+fn cards(report: &FrameReport, kind: &str) -> FitsHeader {
+    let mut cards = FitsHeader::default();
+    cards.text("AN_FILE", kind, "astrometry.net file type");
+    cards.integer("IMAGEW", report.width as i64, "columns of the image");
+    cards.integer("IMAGEH", report.height as i64, "rows of the image");
+    cards
 }
 
 /// The pairs of detections and stars, brightest first.
@@ -58,14 +105,12 @@ pub(super) fn corr(report: &FrameReport, solution: &Solution) -> Vec<u8> {
 
 /// The directions of the identified stars, brightest first.
 pub(super) fn rdls(report: &FrameReport) -> Vec<u8> {
-    let mut columns: Vec<Column<RdlsRow>> = columns! {
+    let columns: Vec<Column<RdlsRow>> = columns! {
         RdlsRow:
         ra, "deg", "pos.eq.ra", "right ascension (ICRS)";
         dec, "deg", "pos.eq.dec", "declination (ICRS)";
     };
-    for (column, name) in columns.iter_mut().zip(["RA", "DEC"]) {
-        column.name = name;
-    }
+    let columns = in_capitals(columns, &["RA", "DEC"]);
     let named = report.stars.iter().filter(|star| star.id.is_some());
     let place = |star: &StarReport| {
         let (ra, dec) = star.ra_deg.zip(star.dec_deg)?;
@@ -73,6 +118,97 @@ pub(super) fn rdls(report: &FrameReport) -> Vec<u8> {
     };
     let places: Vec<RdlsRow> = named.filter_map(place).collect();
     fits_table::file("RDLS", &columns, &places)
+}
+
+/// The detections, brightest first.
+pub(super) fn axy(report: &FrameReport, solution: &Solution) -> Vec<u8> {
+    let columns: Vec<Column<AxyRow>> = columns! {
+        AxyRow:
+        x, "pix", "", "along the rows";
+        y, "pix", "", "along the columns";
+        flux, "", "", "flux above the background";
+        background, "", "", "level of the sky, its median";
+    };
+    let columns = in_capitals(columns, &["X", "Y", "FLUX", "BACKGROUND"]);
+    let background = solution.background.map(|background| background.level_adu);
+    let rows = solution.sources.iter().map(|source| {
+        let [x, y] = report.file_pixel(&source.position);
+        let flux = source.flux;
+        AxyRow {
+            x,
+            y,
+            flux,
+            background,
+        }
+    });
+    let rows: Vec<AxyRow> = rows.collect();
+    fits_table::file_with(&cards(report, "XYLS"), "SOURCES", &columns, &rows)
+}
+
+/// Where the identified stars are expected, brightest first.
+pub(super) fn index_xyls(report: &FrameReport, solution: &Solution) -> Vec<u8> {
+    let columns: Vec<Column<XylsRow>> = columns! {
+        XylsRow:
+        x, "pix", "", "along the rows";
+        y, "pix", "", "along the columns";
+    };
+    let columns = in_capitals(columns, &["X", "Y"]);
+    let place = |pair: CorrRow| XylsRow {
+        x: pair.index_x,
+        y: pair.index_y,
+    };
+    let rows: Vec<XylsRow> = pairs(report, solution).into_iter().map(place).collect();
+    fits_table::file_with(&cards(report, "XYLS"), "INDEX", &columns, &rows)
+}
+
+/// How good the identification is, in one row; no row where there is none.
+pub(super) fn matched(report: &FrameReport, solution: &Solution) -> Vec<u8> {
+    let columns: Vec<Column<MatchRow>> = columns! {
+        MatchRow:
+        radius, "deg", "", "half the diagonal";
+        nmatch, "", "", "identified detections";
+        ndistract, "", "", "others";
+        nconflict, "", "", "none";
+        nfield, "", "", "detections";
+        nindex, "", "", "stars";
+        wcs_valid, "", "", "whether there are coordinates";
+        parity, "", "", "whether the image is mirrored";
+        logodds, "", "", "natural logarithm of the odds that this is no chance";
+    };
+    let names = [
+        "RADIUS",
+        "NMATCH",
+        "NDISTRACT",
+        "NCONFLICT",
+        "NFIELD",
+        "NINDEX",
+        "WCS_VALID",
+        "PARITY",
+        "LOGODDS",
+    ];
+    let columns = in_capitals(columns, &names);
+    let rows: Vec<MatchRow> = match_row(report, solution).into_iter().collect();
+    fits_table::file_with(&cards(report, "MATCH"), "MATCH", &columns, &rows)
+}
+
+fn match_row(report: &FrameReport, solution: &Solution) -> Option<MatchRow> {
+    let found = solution.outcome.identification()?;
+    let [[xx, xy], [yx, yy]] = wcs::linear(solution)?.cd_deg;
+    let determinant = xx * yy - xy * yx;
+    let diagonal_px = libm::hypot(report.width as f64, report.height as f64);
+    let stars = found.matches.len() as u64;
+    let detections = solution.sources.len() as u64;
+    Some(MatchRow {
+        radius: 0.5 * diagonal_px * determinant.abs().sqrt(),
+        nmatch: stars,
+        ndistract: detections.saturating_sub(stars),
+        nconflict: 0,
+        nfield: detections,
+        nindex: stars,
+        wcs_valid: true,
+        parity: determinant > 0.0,
+        logodds: -LN_10 * found.log10_false_alarm,
+    })
 }
 
 fn pairs(report: &FrameReport, solution: &Solution) -> Vec<CorrRow> {

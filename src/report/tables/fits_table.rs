@@ -11,13 +11,23 @@ const NO_INTEGER: i64 = i64::MIN;
 
 /// A file with one table. Texts are ASCII: other characters become question marks.
 pub(super) fn file<R>(name: &str, columns: &[Column<R>], rows: &[R]) -> Vec<u8> {
+    file_with(&FitsHeader::default(), name, columns, rows)
+}
+
+/// The same with more cards in the primary header.
+pub(super) fn file_with<R>(
+    cards: &FitsHeader,
+    name: &str,
+    columns: &[Column<R>],
+    rows: &[R],
+) -> Vec<u8> {
     let formats: Vec<ColumnFormat> = columns
         .iter()
         .zip(widths(columns, rows))
         .map(|(column, width)| ColumnFormat::of(&column.empty, width))
         .collect();
     let row_bytes: usize = formats.iter().map(|format| format.bytes()).sum();
-    let mut bytes = primary_header();
+    let mut bytes = primary_header(cards);
     bytes.extend(table_header(
         name,
         columns,
@@ -35,13 +45,14 @@ pub(super) fn file<R>(name: &str, columns: &[Column<R>], rows: &[R]) -> Vec<u8> 
     bytes
 }
 
-fn primary_header() -> Vec<u8> {
+fn primary_header(cards: &FitsHeader) -> Vec<u8> {
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "");
     header.integer("BITPIX", 8, "");
     header.integer("NAXIS", 0, "no image");
     header.logical("EXTEND", true, "");
     header.text("CREATOR", TABLE_CREATOR, "");
+    header.extend(cards);
     header.to_bytes()
 }
 

@@ -29,6 +29,15 @@ pub enum TableFormat {
     Corr,
     /// The directions of the identified stars, as astrometry.net writes them.
     Rdls,
+    /// The places of the detections, as astrometry.net writes them.
+    #[doc(hidden)]
+    Axy,
+    /// Where the identified stars are expected, as astrometry.net writes it.
+    #[doc(hidden)]
+    IndexXyls,
+    /// How good the identification is, as astrometry.net writes it.
+    #[doc(hidden)]
+    Match,
 }
 
 impl TableFormat {
@@ -40,6 +49,9 @@ impl TableFormat {
             Self::Ecsv => "stars.ecsv",
             Self::Corr => "corr",
             Self::Rdls => "rdls",
+            Self::Axy => "axy",
+            Self::IndexXyls => "xyls",
+            Self::Match => "match",
         }
     }
 }
@@ -54,6 +66,9 @@ pub fn stars(report: &FrameReport, solution: &Solution, format: TableFormat) -> 
         TableFormat::Ecsv => ecsv::document(&columns, &rows()).into_bytes(),
         TableFormat::Corr => astrometry_net::corr(report, solution),
         TableFormat::Rdls => astrometry_net::rdls(report),
+        TableFormat::Axy => astrometry_net::axy(report, solution),
+        TableFormat::IndexXyls => astrometry_net::index_xyls(report, solution),
+        TableFormat::Match => astrometry_net::matched(report, solution),
     }
 }
 

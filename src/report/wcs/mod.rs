@@ -53,8 +53,15 @@ const SOLVED_BY: &str = "Solved by starpipe";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn header(frame: &str, solution: &Solution) -> Option<Vec<u8>> {
+    header_to_order(frame, solution, sip::MAX_ORDER)
+}
+
+/// [`header`] with polynomials of this order at most; of order 1 there are none, and the linear part is that which
+/// fits best.
+#[doc(hidden)]
+pub fn header_to_order(frame: &str, solution: &Solution, max_order: usize) -> Option<Vec<u8>> {
     let row_order = solution.row_order.unwrap_or_default();
-    let solved = cards(frame, solution, row_order)?;
+    let solved = cards(frame, solution, row_order, max_order)?;
     let mut header = FitsHeader::default();
     header.logical("SIMPLE", true, "FITS header without data");
     header.integer("BITPIX", 8, "");
@@ -80,7 +87,7 @@ pub fn solved_copy(
     solution: &Solution,
     row_order: RowOrder,
 ) -> Result<Option<Vec<u8>>, FitsWriteError> {
-    let Some(solved) = cards(name, solution, RowOrder::TopDown) else {
+    let Some(solved) = cards(name, solution, RowOrder::TopDown, sip::MAX_ORDER) else {
         return Ok(None);
     };
     let mut header = FitsHeader::default();
@@ -102,12 +109,17 @@ pub fn solved_copy(
 
 /// The cards of the coordinates of the frame named `frame`, in a file with its rows in this order; `None`
 /// where it is not identified.
-fn cards(frame: &str, solution: &Solution, row_order: RowOrder) -> Option<FitsHeader> {
+fn cards(
+    frame: &str,
+    solution: &Solution,
+    row_order: RowOrder,
+    max_order: usize,
+) -> Option<FitsHeader> {
     let Outcome::Identified(identification) = &solution.outcome else {
         return None;
     };
     let mut header = FitsHeader::default();
-    add_projection(&mut header, &view_of(identification), row_order);
+    Mapping::new(&view_of(identification), row_order, max_order).add_to(&mut header);
     add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
         let utc = known.date.to_iso();
@@ -125,7 +137,7 @@ pub fn is_header(file: &[u8]) -> bool {
 
 /// Adds the mapping from a file's pixels to the directions of the catalogue.
 pub fn add_projection(header: &mut FitsHeader, view: &SkyView, row_order: RowOrder) {
-    Mapping::new(view, row_order).add_to(header);
+    Mapping::new(view, row_order, sip::MAX_ORDER).add_to(header);
 }
 
 /// The linear part of a frame's coordinates.
@@ -142,7 +154,8 @@ pub struct LinearWcs {
 /// The linear part of the coordinates that [`header`] writes; `None` where the frame is not identified.
 pub fn linear(solution: &Solution) -> Option<LinearWcs> {
     let found = solution.outcome.identification()?;
-    let mapping = Mapping::new(&view_of(found), solution.row_order.unwrap_or_default());
+    let row_order = solution.row_order.unwrap_or_default();
+    let mapping = Mapping::new(&view_of(found), row_order, sip::MAX_ORDER);
     Some(mapping.linear)
 }
 
@@ -162,7 +175,7 @@ struct Mapping {
 }
 
 impl Mapping {
-    fn new(view: &SkyView, row_order: RowOrder) -> Self {
+    fn new(view: &SkyView, row_order: RowOrder, max_order: usize) -> Self {
         let SkyView { camera, places, .. } = view;
         let icrs_to_camera = &places.astrometric_attitude(view.icrs_to_camera);
         let plane = Plane::from_camera(camera);
@@ -178,7 +191,7 @@ impl Mapping {
             plane.place_of(&icrs_to_camera.apply(&places.astrometric(&apparent)))
         };
         let sip = (!is_plain)
-            .then(|| Sip::new(camera, &reference, place))
+            .then(|| Sip::new(camera, &reference, max_order, place))
             .flatten();
         let (sip, rows) = match row_order {
             RowOrder::TopDown => (sip, 1.0),
@@ -204,6 +217,7 @@ impl Mapping {
             crpix: [reference.x + 1.0, row + 1.0],
             cd_deg: [[cd[(0, 0)], cd[(0, 1)]], [cd[(1, 0)], cd[(1, 1)]]],
         };
+        let sip = sip.filter(|_| max_order > 1);
         Self { plane, linear, sip }
     }
 

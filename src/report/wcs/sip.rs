@@ -5,7 +5,7 @@ use crate::camera::CameraModel;
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 /// Highest order; keywords have one digit per power.
-const MAX_ORDER: usize = 9;
+pub(super) const MAX_ORDER: usize = 9;
 /// Lowest order, to tell the linear part from the rest.
 const MIN_ORDER: usize = 3;
 /// Error at which no higher order is tried, in pixels.
@@ -69,10 +69,12 @@ pub(super) struct Sip {
 
 impl Sip {
     /// The mapping of `camera`, whose boresight is at `reference`; `plane` is where a direction is on
-    /// the plane, in units of the focal length. `None` where its pixels do not determine it.
+    /// the plane, in units of the focal length. Orders are `max_order` at most; of order 1 the linear part is that
+    /// which fits best. `None` where its pixels do not determine it.
     pub(super) fn new(
         camera: &CameraModel,
         reference: &PixelPoint,
+        max_order: usize,
         plane: impl Fn(&UnitVector<crate::base::coords::Camera>) -> [f64; 2],
     ) -> Option<Self> {
         let focal_px = camera.focal_length_px();
@@ -84,7 +86,7 @@ impl Sip {
         });
         let (offsets, places): (Vec<[f64; 2]>, Vec<[f64; 2]>) = seen.unzip();
         let scale_px = camera.radius_px();
-        let whole = fit_best(&offsets, &places, scale_px)?;
+        let whole = fit_best(&offsets, &places, scale_px, max_order)?;
         let linear_of = |axis: usize| {
             let of = |powers: (usize, usize)| {
                 let mut terms = whole[axis].terms();
@@ -119,7 +121,7 @@ impl Sip {
         Some(Self {
             linear,
             forward: [forward(0), forward(1)],
-            inverse: fit_best(&straight, &shifts, scale_px)?,
+            inverse: fit_best(&straight, &shifts, scale_px, max_order)?,
         })
     }
 
@@ -155,10 +157,16 @@ fn pixels(camera: &CameraModel) -> Vec<PixelPoint> {
 }
 
 /// The polynomials of the lowest order that map `from` to `to` well enough, or of the order that does
-/// it best.
-fn fit_best(from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64) -> Option<[Polynomial; 2]> {
+/// it best; none is higher than `max_order`.
+fn fit_best(
+    from: &[[f64; 2]],
+    to: &[[f64; 2]],
+    scale_px: f64,
+    max_order: usize,
+) -> Option<[Polynomial; 2]> {
     let mut best: Option<(f64, [Polynomial; 2])> = None;
-    for order in MIN_ORDER..=MAX_ORDER {
+    let max_order = max_order.clamp(1, MAX_ORDER);
+    for order in MIN_ORDER.min(max_order)..=max_order {
         let Some(fitted) = fit(order, from, to, scale_px) else {
             break;
         };

@@ -116,7 +116,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
-    ("doors", &["base", "identify", "report", "solve"]),
+    ("doors", &["base", "frame", "identify", "report", "solve"]),
     (
         "night",
         &[

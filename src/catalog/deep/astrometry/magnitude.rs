@@ -1,7 +1,7 @@
 //! The V magnitude of a star by the table beside the tree.
 
+use crate::base::fits_tables::{Column, FitsTable};
 use crate::catalog::Band;
-use crate::catalog::deep::fits_tables::{Column, FitsTable};
 use crate::catalog::gaia;
 use crate::catalog::star::rounded_mag;
 use crate::catalog::tycho2::johnson;

@@ -8,8 +8,8 @@
 //! Data (thesis, University of Toronto), chapter 3.
 
 use crate::base::file_ranges::FileRanges;
+use crate::base::fits_tables::{Cards, FitsTable, Rows};
 use crate::catalog::deep::error::Damage;
-use crate::catalog::deep::fits_tables::{Cards, FitsTable, Rows};
 use nalgebra::Vector3;
 use std::ops::Range;
 

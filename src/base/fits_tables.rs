@@ -3,10 +3,10 @@
 //! # Reference
 //! FITS Standard 4.0 (2018), sect. 4 and 7.3.
 
-use super::error::Damage;
-use crate::base::file_ranges::FileRanges;
-use crate::base::fits_types::element_bytes;
+use super::file_ranges::FileRanges;
+use super::fits_types::element_bytes;
 use std::collections::HashMap;
+use std::io::{self, ErrorKind};
 use std::ops::Range;
 
 /// Headers and data fill blocks of this many bytes.
@@ -60,6 +60,10 @@ fn value_of(text: &str) -> String {
     }
 }
 
+fn invalid(what: impl Into<String>) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, what.into())
+}
+
 /// A column of a table.
 #[derive(Debug)]
 pub struct Column {
@@ -95,23 +99,23 @@ pub struct Rows {
 
 impl Rows {
     /// The rows of a range, one after the other.
-    pub fn read(&self, file: &FileRanges, rows: Range<u64>) -> Result<Vec<u8>, Damage> {
+    pub fn read(&self, file: &FileRanges, rows: Range<u64>) -> io::Result<Vec<u8>> {
         if rows.end > self.count {
             let message = format!("row {} of a table of {} rows", rows.end, self.count);
-            return Err(Damage::Invalid(message));
+            return Err(invalid(message));
         }
         let at = |row: u64| self.start + row * self.bytes as u64;
-        Ok(file.read(at(rows.start)..at(rows.end))?)
+        file.read(at(rows.start)..at(rows.end))
     }
 
     /// All rows, one after the other, of a table that has few.
-    pub fn read_all(&self, file: &FileRanges) -> Result<Vec<u8>, Damage> {
+    pub fn read_all(&self, file: &FileRanges) -> io::Result<Vec<u8>> {
         /// A hundred times those of the largest tree of stars.
         const MOST_BYTES: u64 = 1 << 28;
         let bytes = self.count.saturating_mul(self.bytes as u64);
         if bytes > MOST_BYTES {
             let message = format!("a table of {bytes} bytes where {MOST_BYTES} are the most");
-            return Err(Damage::Invalid(message));
+            return Err(invalid(message));
         }
         self.read(file, 0..self.count)
     }
@@ -135,11 +139,12 @@ impl FitsTable {
 /// The header of a FITS file, and its binary tables.
 ///
 /// # Errors
-/// [`Damage`] where the file cannot be read, or is no FITS file; a table that the file does not hold whole.
-pub fn read_tables(file: &FileRanges) -> Result<(Cards, Vec<FitsTable>), Damage> {
+/// The file cannot be read, or is no FITS file (of the kind [`ErrorKind::InvalidData`]), or ends before a table
+/// does ([`ErrorKind::UnexpectedEof`]).
+pub fn read_tables(file: &FileRanges) -> io::Result<(Cards, Vec<FitsTable>)> {
     let (primary, mut at) = read_header(file, 0)?;
     if primary.text("SIMPLE") != Some("T") {
-        return Err(Damage::Invalid("a FITS file without SIMPLE = T".to_owned()));
+        return Err(invalid("a FITS file without SIMPLE = T".to_owned()));
     }
     at = end_of_data(&primary, at)?;
     let mut tables = Vec::new();
@@ -154,7 +159,7 @@ pub fn read_tables(file: &FileRanges) -> Result<(Cards, Vec<FitsTable>), Damage>
 }
 
 /// The header at a byte of the file, and the byte after it.
-fn read_header(file: &FileRanges, mut at: u64) -> Result<(Cards, u64), Damage> {
+fn read_header(file: &FileRanges, mut at: u64) -> io::Result<(Cards, u64)> {
     let mut cards = Cards::default();
     for _ in 0..MAX_HEADER_BLOCKS {
         let block = file.read(at..at + BLOCK)?;
@@ -163,19 +168,19 @@ fn read_header(file: &FileRanges, mut at: u64) -> Result<(Cards, u64), Damage> {
             return Ok((cards, at));
         }
     }
-    Err(Damage::Invalid("a header without END".to_owned()))
+    Err(invalid("a header without END".to_owned()))
 }
 
 /// The first byte after the data that begin at `start`.
-fn end_of_data(cards: &Cards, start: u64) -> Result<u64, Damage> {
+fn end_of_data(cards: &Cards, start: u64) -> io::Result<u64> {
     let number = |keyword: &str, default: u64| match cards.text(keyword) {
         Some(text) => text
             .parse::<u64>()
-            .map_err(|_| Damage::Invalid(format!("{keyword} = {text}"))),
+            .map_err(|_| invalid(format!("{keyword} = {text}"))),
         None => Ok(default),
     };
     let axes = number("NAXIS", 0)?;
-    let overflow = || Damage::Invalid("more data than any file holds".to_owned());
+    let overflow = || invalid("more data than any file holds".to_owned());
     if axes == 0 {
         return Ok(start);
     }
@@ -193,8 +198,7 @@ fn end_of_data(cards: &Cards, start: u64) -> Result<u64, Damage> {
         .ok_or_else(overflow)
 }
 
-fn table(cards: Cards, start: u64, length: u64) -> Result<FitsTable, Damage> {
-    let invalid = |what: &str| Damage::Invalid(what.to_owned());
+fn table(cards: Cards, start: u64, length: u64) -> io::Result<FitsTable> {
     let row_bytes: usize = cards
         .number("NAXIS1")
         .ok_or_else(|| invalid("a table without NAXIS1"))?;
@@ -204,7 +208,7 @@ fn table(cards: Cards, start: u64, length: u64) -> Result<FitsTable, Damage> {
     let bytes = rows.checked_mul(row_bytes as u64);
     let end = bytes.and_then(|bytes| start.checked_add(bytes));
     if end.is_none_or(|end| end > length) {
-        return Err(Damage::Truncated);
+        return Err(ErrorKind::UnexpectedEof.into());
     }
     let fields: usize = cards.number("TFIELDS").unwrap_or(0);
     let mut columns = Vec::new();

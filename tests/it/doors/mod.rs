@@ -1,0 +1,3 @@
+//! Command lines and protocols of other solvers, through the program.
+
+mod solve_field;
