@@ -6,6 +6,7 @@ use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
+use super::doors::astap::AstapArgs;
 use super::experiment::ExperimentArgs;
 use super::flats::FlatsArgs;
 use super::identify::IdentifyArgs;
@@ -107,6 +108,8 @@ pub(crate) enum Command {
     Darks(DarksArgs),
     /// Make a master flat from flat-field frames, and measure the gain and the pixel response
     Flats(FlatsArgs),
+    /// Answer in the place of ASTAP: its options, its files, its exit statuses
+    Astap(Box<AstapArgs>),
     #[cfg(feature = "shell")]
     /// Write a script that completes commands and options in a shell
     Completions(CompletionsArgs),

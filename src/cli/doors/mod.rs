@@ -1,7 +1,7 @@
 //! Command lines and protocols of other solvers, answered by the pipeline: what they ask → [`Question`] →
 //! solutions → their files and lines.
 
-#![allow(dead_code)] // until a door uses it
+pub(super) mod astap;
 
 use super::exit::CommandError;
 use super::options::catalog::CatalogOptions;
@@ -34,6 +34,7 @@ impl Question {
         context
     }
 
+    #[allow(dead_code)] // until a door for several frames uses it
     /// Solves `paths`, and hands what the sink makes of the images of each to `take`, in their order. If `take`
     /// breaks, the remaining ones are skipped.
     pub(super) fn answer<S: Sink>(
