@@ -23,6 +23,7 @@ pub fn solved_cards(
     solution: &Solution,
     rows: RowOrder,
     with_distortion: bool,
+    warning: Option<&str>,
 ) -> FitsHeader {
     let mut header = FitsHeader::default();
     let found = solution.outcome.identification();
@@ -44,6 +45,9 @@ pub fn solved_cards(
     header.real("CROTA2", turn_y, "Image twist of Y axis (deg)");
     let program = concat!("solved by starpipe ", env!("CARGO_PKG_VERSION"));
     header.logical("PLTSOLVD", true, program);
+    if let Some(warning) = warning {
+        header.text("WARNING", warning, "");
+    }
     header
 }
 
@@ -168,9 +172,9 @@ fn keyword(card: &Card) -> &str {
 
 /// Whether a keyword belongs to the coordinates of an image.
 fn is_coordinate(name: &str) -> bool {
-    const WHOLE: [&str; 9] = [
-        "WCSAXES", "LONPOLE", "LATPOLE", "RADESYS", "RADECSYS", "EQUINOX", "PLTSOLVD", "CRDER1",
-        "CRDER2",
+    const WHOLE: [&str; 10] = [
+        "WARNING", "WCSAXES", "LONPOLE", "LATPOLE", "RADESYS", "RADECSYS", "EQUINOX", "PLTSOLVD",
+        "CRDER1", "CRDER2",
     ];
     const BY_AXIS: [&str; 6] = ["CTYPE", "CUNIT", "CRPIX", "CRVAL", "CDELT", "CROTA"];
     const BY_TWO_NUMBERS: [&str; 7] = ["CD", "PC", "PV", "A_", "B_", "AP_", "BP_"];

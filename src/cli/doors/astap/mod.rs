@@ -167,7 +167,13 @@ impl Run {
             size_px: Some(plate.size_px),
             warning: warning.as_deref(),
         })?;
-        let cards = solved_cards(plate, solution, rows, self.arguments.sip);
+        let cards = solved_cards(
+            plate,
+            solution,
+            rows,
+            self.arguments.sip,
+            warning.as_deref(),
+        );
         let file = match self.head.starts_with(b"SIMPLE") {
             true => fs::read(&self.path)?,
             false => Vec::new(),

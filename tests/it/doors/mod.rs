@@ -1,0 +1,3 @@
+//! Programs that call other solvers: what they pass, and how they read the answer.
+
+mod astap;
