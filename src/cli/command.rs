@@ -6,7 +6,8 @@ use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
-use super::doors::SolveFieldArgs;
+use super::doors::solve_field::SolveFieldArgs;
+use super::doors::astap::AstapArgs;
 use super::experiment::ExperimentArgs;
 use super::flats::FlatsArgs;
 use super::identify::IdentifyArgs;
@@ -110,6 +111,8 @@ pub(crate) enum Command {
     Flats(FlatsArgs),
     /// Solve images and lists of centroids as solve-field of astrometry.net does: its options, lines and files
     SolveField(Box<SolveFieldArgs>),
+    /// Answer in the place of ASTAP: its options, its files, its exit statuses
+    Astap(Box<AstapArgs>),
     #[cfg(feature = "shell")]
     /// Write a script that completes commands and options in a shell
     Completions(CompletionsArgs),

@@ -47,6 +47,8 @@ pub(crate) enum Exit {
     NotIdentified,
     /// The work is done, but no result meets the requirement.
     Unmet,
+    /// That of another program, in whose place this one answers.
+    Other(u8),
 }
 
 impl Exit {
@@ -93,6 +95,7 @@ impl From<Exit> for ExitCode {
             Exit::Failure => 1,
             // clap exits with 2 if the command line is wrong.
             Exit::NotIdentified | Exit::Unmet => 3,
+            Exit::Other(status) => status,
         })
     }
 }

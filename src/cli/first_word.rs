@@ -1,6 +1,7 @@
 //! The first word of the command line: a command, or frames for `process`; and which suite `validate` runs. The
 //! name by which the program is called may stand for a command, too.
 
+use super::doors::astap;
 use clap::Command;
 use clap::error::ErrorKind;
 use std::ffi::{OsStr, OsString};
@@ -49,14 +50,14 @@ pub(crate) fn completed(
     let mut words: Vec<OsString> = words.collect();
     if let Some(command) = words.first().and_then(|name| other_program(name)) {
         words.insert(1, command.into());
-        return Ok(words);
+        return Ok(in_own_words(words));
     }
     let Some(first) = words.get(1) else {
         return Ok(words);
     };
     match kind_of(first, program) {
         FirstWord::Command if first == VALIDATE => return Ok(of_suite(words, program)),
-        FirstWord::Command => {}
+        FirstWord::Command => return Ok(in_own_words(words)),
         FirstWord::Frame => words.insert(1, "process".into()),
         FirstWord::Synonym(command) => {
             let message = format!(
@@ -67,6 +68,14 @@ pub(crate) fn completed(
         }
     }
     Ok(words)
+}
+
+/// The words of a command whose options are those of another program, as this one has options.
+fn in_own_words(words: Vec<OsString>) -> Vec<OsString> {
+    if words.get(1).is_some_and(|command| command == astap::NAME) {
+        return astap::translated(words);
+    }
+    words
 }
 
 /// The command that answers in place of the solver by whose name the program is called.

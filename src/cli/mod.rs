@@ -97,7 +97,8 @@ fn run_command(command: Command) -> Result<CommandOutput, CommandError> {
         Command::ValidateSky(arguments) => validate::sky(&arguments),
         Command::ValidateRobustness(arguments) => validate::robustness(&arguments),
         Command::ValidateClutter(arguments) => validate::clutter(&arguments),
-        Command::SolveField(arguments) => doors::solve_field(&arguments),
+        Command::SolveField(arguments) => doors::solve_field::solve_field(&arguments),
+        Command::Astap(arguments) => doors::astap::astap(*arguments),
         #[cfg(feature = "shell")]
         Command::Completions(arguments) => shell::completions(&arguments, Arguments::command()),
         #[cfg(feature = "shell")]

@@ -5,6 +5,7 @@
 //!
 //! The answers are those of [`solve`](mod@crate::solve) and [`report`](mod@crate::report); a door only translates.
 
+pub mod astap;
 mod field;
 mod scale;
 pub mod solve_field;

@@ -1,9 +1,8 @@
 //! Command lines and protocols of other solvers, answered by the pipeline: what they ask → [`Question`] →
 //! solutions → their files and lines.
 
-mod solve_field;
-
-pub(crate) use solve_field::{SolveFieldArgs, solve_field};
+pub(super) mod astap;
+pub(super) mod solve_field;
 
 use super::exit::CommandError;
 use super::options::catalog::CatalogOptions;

@@ -40,6 +40,11 @@ struct Opened {
 }
 
 impl CatalogOptions {
+    /// The catalogue at `path`, unless another is stated.
+    pub(crate) fn set_if_none(&mut self, path: PathBuf) {
+        self.catalog.get_or_insert(path);
+    }
+
     /// Runs `work` with the threads and the catalogue with its index; errors of the index's cache
     /// are reported.
     pub(crate) fn with_index<R>(

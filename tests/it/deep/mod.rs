@@ -1,10 +1,10 @@
 //! Deep catalogues of other programs: what is read of them, and fields that are identified with them.
 
-mod areas;
+pub mod areas;
 mod damage;
 mod fields;
 mod index_file;
-mod patch;
+pub mod patch;
 mod reading;
 #[cfg(target_os = "linux")]
 mod sparse;

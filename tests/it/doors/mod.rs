@@ -1,3 +1,5 @@
-//! Command lines and protocols of other solvers, through the program.
+//! Command lines and protocols of other solvers, through the program: what their callers pass, and how they read
+//! the answer.
 
+mod astap;
 mod solve_field;

@@ -116,7 +116,10 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
-    ("doors", &["base", "frame", "identify", "report", "solve"]),
+    (
+        "doors",
+        &["base", "detect", "frame", "identify", "report", "solve"],
+    ),
     (
         "night",
         &[
