@@ -6,6 +6,7 @@
 //! The answers are those of [`solve`](mod@crate::solve) and [`report`](mod@crate::report); a door only translates.
 
 mod field;
+pub mod nova;
 mod scale;
 
 pub use field::Field;

@@ -3,6 +3,9 @@
 
 #![allow(dead_code)] // until a door uses it
 
+#[cfg(feature = "serve")]
+pub(super) mod serve;
+
 use super::exit::CommandError;
 use super::options::catalog::CatalogOptions;
 use super::solving::{InputSolver, Inputs, Sink, SolvingPlan};

@@ -3,9 +3,10 @@
 //! Pixels count from 1, as in FITS, in the rows of the file.
 //!
 //! # Reference
-//! astrometry.net 0.97, `solve-field --corr` and `--rdls`.
+//! astrometry.net 0.97, `solve-field --corr`, `--rdls` and `--axy`.
 
 use super::fits_table;
+use crate::base::coords::PixelPoint;
 use crate::base::table::{Column, columns};
 use crate::report::{FrameReport, StarReport};
 use crate::solve::Solution;
@@ -24,6 +25,13 @@ struct CorrRow {
     index_id: Option<u64>,
     field_id: u64,
     match_weight: f64,
+    flux: Option<f64>,
+}
+
+/// A detection. Names are those of astrometry.net.
+struct AxyRow {
+    x: f64,
+    y: f64,
     flux: Option<f64>,
 }
 
@@ -73,6 +81,26 @@ pub(super) fn rdls(report: &FrameReport) -> Vec<u8> {
     };
     let places: Vec<RdlsRow> = named.filter_map(place).collect();
     fits_table::file("RDLS", &columns, &places)
+}
+
+/// The places of the detections, brightest first.
+pub(super) fn axy(report: &FrameReport) -> Vec<u8> {
+    let mut columns: Vec<Column<AxyRow>> = columns! {
+        AxyRow:
+        x, "pix", "", "detection, along the rows";
+        y, "pix", "", "detection, along the columns";
+        flux, "", "", "flux of the detection";
+    };
+    for (column, name) in columns.iter_mut().zip(["X", "Y", "FLUX"]) {
+        column.name = name;
+    }
+    let row = |star: &StarReport| {
+        let [x, y] = report.file_pixel(&PixelPoint::new(star.x, star.y));
+        let flux = star.flux;
+        AxyRow { x, y, flux }
+    };
+    let rows: Vec<AxyRow> = report.stars.iter().map(row).collect();
+    fits_table::file("SOURCES", &columns, &rows)
 }
 
 fn pairs(report: &FrameReport, solution: &Solution) -> Vec<CorrRow> {

@@ -3,7 +3,7 @@
 //! ([`FrameReport`], [`Solution`]) → bytes. Nothing is read or written.
 //!
 //! - FITS, VOTable, ECSV: the columns of [`StarRow`].
-//! - `.corr`, `.rdls`: the tables of astrometry.net.
+//! - `.corr`, `.rdls`, `.axy`: the tables of astrometry.net.
 
 mod astrometry_net;
 mod ecsv;
@@ -29,6 +29,8 @@ pub enum TableFormat {
     Corr,
     /// The directions of the identified stars, as astrometry.net writes them.
     Rdls,
+    /// The places of the detections, as astrometry.net writes them.
+    Axy,
 }
 
 impl TableFormat {
@@ -40,6 +42,7 @@ impl TableFormat {
             Self::Ecsv => "stars.ecsv",
             Self::Corr => "corr",
             Self::Rdls => "rdls",
+            Self::Axy => "axy",
         }
     }
 }
@@ -54,6 +57,7 @@ pub fn stars(report: &FrameReport, solution: &Solution, format: TableFormat) -> 
         TableFormat::Ecsv => ecsv::document(&columns, &rows()).into_bytes(),
         TableFormat::Corr => astrometry_net::corr(report, solution),
         TableFormat::Rdls => astrometry_net::rdls(report),
+        TableFormat::Axy => astrometry_net::axy(report),
     }
 }
 

@@ -116,7 +116,10 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
-    ("doors", &["base", "identify", "report", "solve"]),
+    (
+        "doors",
+        &["base", "identify", "centroids", "solve", "report"],
+    ),
     (
         "night",
         &[
