@@ -21,6 +21,7 @@ mod deep;
 mod defocus;
 mod detect;
 mod diagnosis;
+mod doors;
 mod experiment;
 mod faults;
 mod fixtures;

@@ -71,7 +71,6 @@ where
         if bytes.len() + data.len() > server.max_upload {
             return Err(too_long());
         }
-        // A vector that grows has room for twice as much.
         let held = memory.as_ref().map_or(0, OwnedSemaphorePermit::num_permits);
         let needed = (bytes.len() + data.len()).div_ceil(1000);
         if needed > held {

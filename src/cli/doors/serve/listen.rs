@@ -84,11 +84,12 @@ impl Listening {
             () = signals.next() => server.abort(),
         }
         // Workers may still run jobs that nobody waits for.
-        let server = Arc::clone(&server);
-        tokio::spawn(async move {
-            signals.next().await;
-            server.abort();
-        });
+        while server.metrics.running() > 0 {
+            tokio::select! {
+                () = tokio::time::sleep(PAUSE) => {}
+                () = signals.next() => server.abort(),
+            }
+        }
         Ok(())
     }
 }

@@ -64,6 +64,11 @@ impl Metrics {
         }
     }
 
+    /// How many frames are being solved.
+    pub(super) fn running(&self) -> u64 {
+        self.running.load(Ordering::Relaxed)
+    }
+
     pub(super) fn count_request(&self, status: u16) {
         if let Some(counter) = self.requests.get(usize::from(status / 100)) {
             counter.fetch_add(1, Ordering::Relaxed);
@@ -111,7 +116,7 @@ impl Metrics {
             "running",
             "gauge",
             "Frames that are being solved.",
-            &one(of(&self.running)),
+            &one(self.running()),
         );
         add(
             "workers",

@@ -4,7 +4,7 @@ use super::body::{Received, receive};
 use super::http::{TEXT, nova_reply, reply, shown_name, text_of};
 use super::refusal::{NovaRefusal, Refusal};
 use super::store::{Job, JobResult};
-use super::worker::{WCS, Wanted, Work, format_name, input_of_job, now};
+use super::worker::{WCS, Wanted, Work, input_of_job, now};
 use super::{Server, fetch, solve};
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, header};
@@ -279,17 +279,17 @@ pub(super) async fn wcs_file(State(server): Shared, Path(id): Path<String>) -> A
 
 /// `/rdls_file/ID`
 pub(super) async fn rdls_file(State(server): Shared, Path(id): Path<String>) -> Answer {
-    file(&server, &id, format_name(TableFormat::Rdls), "rdls.fits").await
+    file(&server, &id, TableFormat::Rdls.extension(), "rdls.fits").await
 }
 
 /// `/axy_file/ID`
 pub(super) async fn axy_file(State(server): Shared, Path(id): Path<String>) -> Answer {
-    file(&server, &id, format_name(TableFormat::Axy), "axy.fits").await
+    file(&server, &id, TableFormat::Axy.extension(), "axy.fits").await
 }
 
 /// `/corr_file/ID`
 pub(super) async fn corr_file(State(server): Shared, Path(id): Path<String>) -> Answer {
-    file(&server, &id, format_name(TableFormat::Corr), "corr.fits").await
+    file(&server, &id, TableFormat::Corr.extension(), "corr.fits").await
 }
 
 /// `/new_fits_file/ID`

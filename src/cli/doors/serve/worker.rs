@@ -61,6 +61,9 @@ pub(super) enum Wanted {
     SolvedCopy,
 }
 
+/// Name and content of a file.
+type ResultFile = (&'static str, Vec<u8>);
+
 /// What the workers share.
 pub(super) struct Solver<'a> {
     pub(super) server: &'a Server,
@@ -105,22 +108,11 @@ impl Solver<'_> {
     fn finish_job(&self, number: u64, workspace: &mut Workspace) -> anyhow::Result<()> {
         let started = now();
         let store = &self.server.store;
-        let input = input_of_job(self.server, number)?;
-        let solved = self.timed(&input, workspace, |solved, _| {
-            let SolvedImage { solution, .. } = solved;
-            let report = FrameReport::new(&input.name, solution, self.indexed.catalog());
-            let table = |format| {
-                (
-                    format_name(format),
-                    tables::stars(&report, solution, format),
-                )
-            };
-            let mut files = vec![table(TableFormat::Axy)];
-            if let Some(header) = wcs::header(&input.name, solution) {
-                files.push((WCS, header));
-                files.extend([TableFormat::Rdls, TableFormat::Corr].map(table));
-            }
-            Ok((JobAnswers::new(&report, solution), files))
+        let input = input_of_job(self.server, number);
+        let solved = input.and_then(|input| {
+            self.timed(&input, workspace, |solved, _| {
+                Ok(self.results(&input, solved))
+            })
         });
         if self.server.interrupt().is_due() {
             // The next start does it.
@@ -142,6 +134,22 @@ impl Solver<'_> {
             answers,
         };
         store.finish(number, &result, files)
+    }
+
+    /// What is kept of a job: its answers, and files by name.
+    fn results(&self, input: &Input, solved: &SolvedImage) -> (JobAnswers, Vec<ResultFile>) {
+        let solution = &solved.solution;
+        let report = FrameReport::new(&input.name, solution, self.indexed.catalog());
+        let table = |format: TableFormat| {
+            let table = tables::stars(&report, solution, format);
+            (format.extension(), table)
+        };
+        let mut files = vec![table(TableFormat::Axy)];
+        if let Some(header) = wcs::header(&input.name, solution) {
+            files.push((WCS, header));
+            files.extend([TableFormat::Rdls, TableFormat::Corr].map(table));
+        }
+        (JobAnswers::new(&report, solution), files)
     }
 
     /// Solves a frame and makes something of it. Counts how it ended.
@@ -245,11 +253,6 @@ fn overlay_options(wanted: Wanted) -> OverlayOptions {
 
 /// The result file with the coordinates.
 pub(super) const WCS: &str = "wcs";
-
-/// The result file with a table.
-pub(super) fn format_name(format: TableFormat) -> &'static str {
-    format.extension()
-}
 
 /// What a job of the store is solved with.
 pub(super) fn input_of_job(server: &Server, number: u64) -> anyhow::Result<Input> {

@@ -1,0 +1,3 @@
+//! The commands that answer in place of other solvers.
+
+mod serve;
