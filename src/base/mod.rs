@@ -21,4 +21,4 @@ pub mod size;
 pub mod statistics;
 pub mod table;
 pub mod units;
-pub(crate) mod user_folders;
+pub mod user_folders;

@@ -6,8 +6,10 @@ use super::camera::CameraArgs;
 use super::catalog::CatalogArgs;
 use super::darks::DarksArgs;
 use super::defocus::DefocusArgs;
-use super::doors::solve_field::SolveFieldArgs;
 use super::doors::astap::AstapArgs;
+#[cfg(feature = "serve")]
+use super::doors::serve::ServeArgs;
+use super::doors::solve_field::SolveFieldArgs;
 use super::experiment::ExperimentArgs;
 use super::flats::FlatsArgs;
 use super::identify::IdentifyArgs;
@@ -71,6 +73,9 @@ pub(crate) enum Command {
     Archive(ArchiveArgs),
     /// Identify the stars in lists of centroids (CSV)
     Identify(Box<IdentifyArgs>),
+    #[cfg(feature = "serve")]
+    /// Answer programs that ask nova.astrometry.net, and others, over HTTP
+    Serve(Box<ServeArgs>),
     /// Follow the attitude of a camera from frame to frame
     Track(Box<TrackArgs>),
     /// Measure the lens of a camera in several of its frames

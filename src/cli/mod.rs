@@ -81,6 +81,8 @@ fn run_command(command: Command) -> Result<CommandOutput, CommandError> {
         }
         Command::Identify(arguments) => identify::identify(*arguments),
         Command::Archive(arguments) => archive::archive(&arguments),
+        #[cfg(feature = "serve")]
+        Command::Serve(arguments) => doors::serve::serve(&arguments),
         Command::Track(arguments) => track::track(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(*arguments),
         Command::Catalog(arguments) => catalog::catalog(arguments),

@@ -7,6 +7,7 @@
 
 pub mod astap;
 mod field;
+pub mod nova;
 mod scale;
 pub mod solve_field;
 

@@ -649,7 +649,7 @@ pub struct TimingReport {
 
 impl FrameReport {
     /// Where a pixel is in the rows of the file, counted from 1 as in FITS.
-    pub(super) fn file_pixel(&self, pixel: &PixelPoint) -> [f64; 2] {
+    pub(crate) fn file_pixel(&self, pixel: &PixelPoint) -> [f64; 2] {
         let bottom_up = self.row_order == Some(RowOrder::BottomUp);
         let from_top = pixel.y + 1.0;
         let y = if bottom_up {

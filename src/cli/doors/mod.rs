@@ -4,6 +4,9 @@
 pub(super) mod astap;
 pub(super) mod solve_field;
 
+#[cfg(feature = "serve")]
+pub(super) mod serve;
+
 use super::exit::CommandError;
 use super::options::catalog::CatalogOptions;
 use super::solving::{InputSolver, Inputs, Sink, SolvedImage, SolvingPlan};

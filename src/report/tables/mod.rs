@@ -3,7 +3,7 @@
 //! ([`FrameReport`], [`Solution`]) → bytes. Nothing is read or written.
 //!
 //! - FITS, VOTable, ECSV: the columns of [`StarRow`].
-//! - `.corr`, `.rdls`: the tables of astrometry.net.
+//! - `.corr`, `.rdls`, `.axy`: the tables of astrometry.net.
 
 mod astrometry_net;
 mod ecsv;

@@ -2,4 +2,5 @@
 //! the answer.
 
 mod astap;
+mod serve;
 mod solve_field;

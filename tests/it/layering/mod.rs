@@ -118,7 +118,15 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "doors",
-        &["base", "detect", "frame", "identify", "report", "solve"],
+        &[
+            "base",
+            "centroids",
+            "detect",
+            "frame",
+            "identify",
+            "report",
+            "solve",
+        ],
     ),
     (
         "night",

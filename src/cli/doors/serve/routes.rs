@@ -1,0 +1,135 @@
+//! Which address answers what, and what all answers have.
+
+use super::http::{JSON, TEXT, reply};
+use super::pages::OPENAPI;
+use super::refusal::Refusal;
+use super::{Server, nova, pages, solve};
+use axum::Router;
+use axum::extract::{Request, State};
+use axum::http::uri::{PathAndQuery, Uri};
+use axum::http::{HeaderValue, Method, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What pages of this server may load: their own files alone.
+const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
+                      img-src 'self' data: blob:; connect-src 'self'; worker-src 'self'; manifest-src 'self'; \
+                      form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
+
+const HEADERS: [(header::HeaderName, &str); 4] = [
+    (header::CONTENT_SECURITY_POLICY, POLICY),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::CACHE_CONTROL, "no-store"),
+];
+
+/// The routes. Addresses may end with a slash.
+pub(super) fn router(server: Arc<Server>) -> Router {
+    let files = Router::new()
+        .route("/wcs_file/{id}", get(nova::wcs_file))
+        .route("/rdls_file/{id}", get(nova::rdls_file))
+        .route("/axy_file/{id}", get(nova::axy_file))
+        .route("/corr_file/{id}", get(nova::corr_file))
+        .route("/new_fits_file/{id}", get(nova::new_fits_file))
+        .route("/annotated_display/{id}", get(nova::annotated))
+        .route("/annotated_full/{id}", get(nova::annotated))
+        .route("/user_images/{id}", get(nova::annotated))
+        .route("/red_green_image_display/{id}", get(nova::detections))
+        .route("/extraction_image_display/{id}", get(nova::detections))
+        .route("/joblog/{id}", get(nova::job_log));
+    // Clients send what they have, as forms, where they only ask.
+    let either = |handler| get(handler).post(handler);
+    let api = Router::new()
+        .route("/login", post(nova::login))
+        .route("/upload", post(nova::upload))
+        .route("/url_upload", post(nova::url_upload))
+        .route("/myjobs", post(nova::my_jobs))
+        .route("/submission_images", post(nova::submission_images))
+        .route(
+            "/submissions/{id}",
+            get(nova::submission).post(nova::submission),
+        )
+        .route("/jobs/{id}", get(nova::job).post(nova::job))
+        .route("/jobs/{id}/{what}", either(nova::job_answer));
+    let inner = Router::new()
+        .nest("/api", api)
+        .merge(files)
+        .route("/solve", post(solve::solve))
+        .route("/health", get(|| async { reply(TEXT, "ok\n") }))
+        .route("/metrics", get(metrics))
+        .route("/openapi.json", get(|| async { reply(JSON, OPENAPI) }))
+        .route("/", get(pages::index))
+        .fallback(pages::file)
+        .method_not_allowed_fallback(|| async {
+            Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "not with this method")
+        })
+        .with_state(Arc::clone(&server));
+    Router::new()
+        .fallback_service(inner)
+        .layer(from_fn_with_state(server, around))
+}
+
+async fn metrics(State(server): State<Arc<Server>>) -> Response {
+    reply(TEXT, server.metrics.text(&server))
+}
+
+/// What is done for each request: its address is tidied, a foreign page is refused, and its answer is logged.
+async fn around(State(server): State<Arc<Server>>, mut request: Request, next: Next) -> Response {
+    let begun = Instant::now();
+    *request.uri_mut() = tidied(request.uri());
+    let method = request.method().clone();
+    let path = request.uri().path().to_owned();
+    let site = request.headers().get("sec-fetch-site");
+    let is_foreign = site.is_some_and(|site| site == "cross-site") && method == Method::POST;
+    let mut response = if is_foreign {
+        let message = "pages of other sites may not use this server";
+        Refusal::new(StatusCode::FORBIDDEN, message).into_response()
+    } else {
+        next.run(request).await
+    };
+    for (name, value) in HEADERS {
+        let value = HeaderValue::from_static(value);
+        response.headers_mut().entry(name).or_insert(value);
+    }
+    let status = response.status().as_u16();
+    server.metrics.count_request(status);
+    let ms = begun.elapsed().as_millis();
+    tracing::info!(%method, path, status, ms, "request");
+    response
+}
+
+/// The address without the server's name, which proxies' clients send, and without a slash at its end.
+fn tidied(uri: &Uri) -> Uri {
+    let path = match uri.path().trim_end_matches('/') {
+        "" => "/",
+        path => path,
+    };
+    let query = uri
+        .query()
+        .map_or(String::new(), |query| format!("?{query}"));
+    let tidied = PathAndQuery::try_from(format!("{path}{query}"));
+    tidied.map_or_else(|_| uri.clone(), Uri::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_tidied() {
+        for (stated, expected) in [
+            ("/api/login/", "/api/login"),
+            (
+                "http://nova.astrometry.net/api/jobs/1/info/?a=b/",
+                "/api/jobs/1/info?a=b/",
+            ),
+            ("/", "/"),
+            ("//?a", "/?a"),
+        ] {
+            assert_eq!(tidied(&stated.parse().unwrap()).to_string(), expected);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! `POST /solve`: a frame in, the JSON of `process` out.
+
+use super::Server;
+use super::body::receive;
+use super::http::{JSON, reply, shown_name, text_of};
+use super::refusal::Refusal;
+use super::worker;
+use super::worker::{Input, Request as Work, Wanted};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::Response;
+use starpipe::doors::nova::form::{self, Part};
+use starpipe::solve::SolveOptions;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::oneshot;
+
+/// How long a client may wait for its turn and its answer.
+const MAX_WAIT: Duration = Duration::from_secs(600);
+
+/// `POST /solve`
+pub(super) async fn solve(
+    State(server): State<Arc<Server>>,
+    request: Request,
+) -> Result<Response, Refusal> {
+    server.queue.place().map(drop).ok_or_else(no_place)?;
+    let query = form::fields(request.uri().query().unwrap_or_default().as_bytes());
+    let mut stated = Stated::default();
+    stated.add_all(&query);
+    check_key(&server, request.headers(), &stated)?;
+    let kind = text_of(request.headers(), header::CONTENT_TYPE).to_owned();
+    let body = receive(&server, request.into_body()).await?;
+    let content = if form::is_multipart(&kind) {
+        let whole = body.bytes.clone();
+        let parts = form::parts(&kind, &whole).map_err(Refusal::invalid)?;
+        stated.add_all(&parts);
+        let file = parts.iter().find(|part| part.file_name.is_some());
+        let file = file.ok_or_else(|| Refusal::invalid("the form has no file"))?;
+        stated.name = stated.name.or_else(|| file.file_name.clone());
+        body.part(&file.content)
+    } else {
+        body
+    };
+    let input = Input {
+        name: shown_name(stated.name.as_deref()),
+        content,
+        options: stated.options(&server.options)?,
+        upload: None,
+    };
+    let line = answered(&server, input, Wanted::Report).await?;
+    Ok(reply(JSON, line))
+}
+
+/// What a request states.
+#[derive(Default)]
+struct Stated {
+    options: BTreeMap<String, String>,
+    name: Option<String>,
+    key: Option<String>,
+}
+
+impl Stated {
+    fn add_all(&mut self, parts: &[Part]) {
+        for part in parts.iter().filter(|part| part.file_name.is_none()) {
+            let value = part.text().into_owned();
+            match part.name.as_str() {
+                // A field of a page that was left empty.
+                _ if value.is_empty() => {}
+                "name" => self.name = Some(value),
+                "key" => self.key = Some(value),
+                name => drop(self.options.insert(name.replace('-', "_"), value)),
+            }
+        }
+    }
+
+    /// The options of the server with what is stated, within its time limit.
+    fn options(&self, of_server: &SolveOptions) -> Result<SolveOptions, Refusal> {
+        let options = of_server.clone().with(&self.options);
+        let mut options = options.map_err(|error| {
+            let name = error.name.replace('_', "-");
+            Refusal::invalid(format_args!("{name} {}", error.reason))
+        })?;
+        let limits = [options.time_limit_s, of_server.time_limit_s];
+        options.time_limit_s = limits.into_iter().flatten().min_by(f64::total_cmp);
+        Ok(options)
+    }
+}
+
+fn check_key(server: &Server, headers: &HeaderMap, stated: &Stated) -> Result<(), Refusal> {
+    let bearer = text_of(headers, header::AUTHORIZATION).strip_prefix("Bearer ");
+    let key = bearer.map(str::trim).or(stated.key.as_deref());
+    if server.keys.accepts(key) {
+        return Ok(());
+    }
+    let message = "a key is needed: Authorization: Bearer KEY";
+    Err(Refusal::new(StatusCode::UNAUTHORIZED, message))
+}
+
+/// The queue has no place.
+pub(super) fn no_place() -> Refusal {
+    Refusal::busy("the queue is full; ask again later")
+}
+
+/// Waits until a worker has made what is wanted of a frame.
+pub(super) async fn answered(
+    server: &Server,
+    input: Input,
+    wanted: Wanted,
+) -> Result<Vec<u8>, Refusal> {
+    let place = server.queue.place().ok_or_else(no_place)?;
+    let (answer, answered) = oneshot::channel();
+    let request = Work {
+        input,
+        wanted,
+        answer,
+    };
+    place.fill(worker::Work::Request(Box::new(request)));
+    match tokio::time::timeout(MAX_WAIT, answered).await {
+        Ok(Ok(made)) => made,
+        Ok(Err(_)) => Err(Refusal::busy("the server is ending")),
+        Err(_) => {
+            let message = "the answer takes too long";
+            Err(Refusal::new(StatusCode::GATEWAY_TIMEOUT, message))
+        }
+    }
+}
+
+/// Does work that reads or writes files, beside the answering of requests.
+pub(super) async fn blocking<R: Send + 'static>(
+    work: impl FnOnce() -> Result<R, Refusal> + Send + 'static,
+) -> Result<R, Refusal> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.unwrap_or_else(|error| Err(Refusal::internal(&error.into())))
+}
