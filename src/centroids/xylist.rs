@@ -12,6 +12,7 @@ use crate::base::file_ranges::FileRanges;
 use crate::base::fits_tables::{Cards, Column, FitsTable, read_tables};
 use crate::identify::Photometry;
 use crate::photometry::instrumental_mag;
+use memchr::memmem;
 use std::io;
 use std::path::Path;
 
@@ -22,8 +23,8 @@ pub struct XylistOptions {
     pub x: Option<String>,
     /// The column of y; that called `Y` unless it is stated.
     pub y: Option<String>,
-    /// The column by which stars are sorted; that called `FLUX`, if there is one, unless it is stated. Without
-    /// one the rows are in order of brightness.
+    /// The column by which stars are sorted; `FLUX` or `MAG`, if there is one, unless it is stated. Without one the
+    /// rows are in order of brightness.
     pub sort: Option<String>,
     /// Whether its smallest value is that of the brightest star: it has magnitudes, and not fluxes.
     pub is_ascending: bool,
@@ -38,12 +39,22 @@ impl XylistOptions {
         tables.is_ok_and(|(_, tables)| tables.iter().any(|table| self.position(table).is_some()))
     }
 
+    /// The list in the bytes of a file that has one and no picture.
+    pub fn read_bytes(&self, file: &[u8]) -> Option<CentroidList> {
+        /// The first header ends before.
+        const MAX_HEADER_BYTES: usize = 36 * 2880;
+        let head = &file[..file.len().min(MAX_HEADER_BYTES)];
+        memmem::find(head, b"XTENSION= 'BINTABLE")?;
+        let list = self.first_list(&FileRanges::of_bytes(file.to_vec()));
+        list.ok()?.filter(|list| !list.centroids.is_empty())
+    }
+
     /// Reads the first list in a file.
     ///
     /// # Errors
     /// The file cannot be read, or has no such list, or an empty one.
     pub fn read(&self, path: &Path) -> Result<CentroidList, CentroidListError> {
-        let list = self.first_list(path);
+        let list = FileRanges::open(path).and_then(|file| self.first_list(&file));
         let list = list.map_err(|error| CentroidListError::of_list(error.to_string()))?;
         let [x, y] = self.position_names();
         let missing = || format!("found no table with the columns {x} and {y}");
@@ -54,20 +65,23 @@ impl XylistOptions {
         Ok(list)
     }
 
-    fn first_list(&self, path: &Path) -> io::Result<Option<CentroidList>> {
-        let file = FileRanges::open(path)?;
-        let (primary, tables) = read_tables(&file)?;
+    fn first_list(&self, file: &FileRanges) -> io::Result<Option<CentroidList>> {
+        let (primary, tables) = read_tables(file)?;
         let found = |table| Some((table, self.position(table)?));
         let Some((table, position)) = tables.iter().find_map(found) else {
             return Ok(None);
         };
-        let rows = table.rows.read_all(&file)?;
-        let brightness = table.column(self.sort.as_deref().unwrap_or("FLUX"));
+        let rows = table.rows.read_all(file)?;
+        let (brightness, is_ascending) = match (&self.sort, table.column("FLUX")) {
+            (Some(stated), _) => (table.column(stated), self.is_ascending),
+            (None, Some(flux)) => (Some(flux), false),
+            (None, None) => (table.column("MAG"), true),
+        };
         let of_row = |(number, row): (usize, &[u8])| {
             let number_of = |column: &Column| column.number(row).unwrap_or(f64::NAN);
             let [x, y] = position.map(|column| number_of(column) - 1.0);
             let value = brightness.map(number_of);
-            let flux = value.filter(|_| !self.is_ascending);
+            let flux = value.filter(|_| !is_ascending);
             let mag = match (value, flux) {
                 (_, Some(flux)) => instrumental_mag(flux),
                 (Some(mag), None) => mag,

@@ -9,7 +9,6 @@
 
 mod answers;
 pub mod form;
-mod star_table;
 mod upload;
 
 pub use answers::{Calibration, JobAnswers, MarkedObject, NoteOfJob};

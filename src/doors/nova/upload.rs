@@ -1,8 +1,7 @@
 //! The settings of an upload: hints, or a list of stars in place of a picture.
 
-use super::star_table;
 use crate::base::coords::PixelPoint;
-use crate::centroids::{CentroidList, ListedCentroid};
+use crate::centroids::{CentroidList, ListedCentroid, XylistOptions};
 use crate::doors::scale::{ScaleRange, ScaleUnit};
 use crate::identify::Photometry;
 use crate::solve::SolveOptions;
@@ -76,22 +75,38 @@ impl Upload {
 
     /// The list of stars: its own, or the one in `file`, where that is a table of FITS with places.
     pub fn list(&self, file: &[u8]) -> Option<CentroidList> {
-        let places = self.places.clone().or_else(|| star_table::places(file))?;
-        let centroid = |(rank, [x, y]): (usize, [f64; 2])| ListedCentroid {
-            sigma_px: self.error_px,
+        let mut list = match &self.places {
+            Some(places) => Self::stated_list(places),
+            None => XylistOptions::default().read_bytes(file)?,
+        };
+        for (stated, side) in self
+            .sides
+            .into_iter()
+            .zip([&mut list.width, &mut list.height])
+        {
+            *side = stated.or(*side);
+        }
+        for centroid in &mut list.centroids {
+            centroid.sigma_px = self.error_px;
+        }
+        Some(list)
+    }
+
+    fn stated_list(places: &[[f64; 2]]) -> CentroidList {
+        let centroid = |(rank, [x, y]): (usize, &[f64; 2])| ListedCentroid {
             row: rank as u64 + 1,
             ..ListedCentroid::new(
                 PixelPoint::new(x - 1.0, y - 1.0),
                 ListedCentroid::mag_of_rank(rank),
             )
         };
-        Some(CentroidList {
-            width: self.sides[0],
-            height: self.sides[1],
+        CentroidList {
+            width: None,
+            height: None,
             photometry: Photometry::Instrumental,
             has_brightness: false,
-            centroids: places.into_iter().enumerate().map(centroid).collect(),
-        })
+            centroids: places.iter().enumerate().map(centroid).collect(),
+        }
     }
 }
 
