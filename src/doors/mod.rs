@@ -7,9 +7,11 @@
 
 pub mod astap;
 mod field;
+mod fits_header;
 pub mod nova;
 mod scale;
 pub mod solve_field;
 
 pub use field::Field;
+pub use fits_header::FitsFileHeader;
 pub use scale::{ScaleRange, ScaleUnit};

@@ -10,13 +10,13 @@
 //! # Reference
 //! ASTAP 2022.12 (Debian) and 2026.05: what it prints and writes; its help; <https://www.hnsky.org/astap.htm>.
 
-mod header;
+mod cards;
 mod hfd;
 mod hints;
 mod ini;
 mod plate;
 
-pub use header::{Header, solved_cards};
+pub use cards::solved_cards;
 pub use hfd::StarList;
 pub use hints::Hints;
 pub use ini::{Failure, Ini};

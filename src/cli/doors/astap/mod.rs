@@ -17,7 +17,8 @@ use crate::cli::solving::{Inputs, SolvingPlan};
 use anyhow::anyhow;
 use starpipe::catalog::Catalog;
 use starpipe::detect::{DetectConfig, detect};
-use starpipe::doors::astap::{Failure, Header, Ini, Plate, StarList, row_order, solved_cards};
+use starpipe::doors::FitsFileHeader;
+use starpipe::doors::astap::{Failure, Ini, Plate, StarList, row_order, solved_cards};
 use starpipe::frame::{Frame, MemoryLimit, PageChoice, RowOrder};
 use starpipe::report::FrameReport;
 use starpipe::solve::{Outcome, Solution, Source, Workspace, solve_guarded, solve_read};
@@ -178,8 +179,9 @@ impl Run {
             true => fs::read(&self.path)?,
             false => Vec::new(),
         };
-        let header = Header::of_file(&file).filter(|header| header.is_of_image(plate.size_px));
-        let minimal = Header::default();
+        let header =
+            FitsFileHeader::of_file(&file).filter(|header| header.is_of_image(plate.size_px));
+        let minimal = FitsFileHeader::default();
         let whole = header.as_ref().unwrap_or(&minimal);
         let wcs = match self.arguments.wcs {
             true => whole.wcs_blocks(&cards),

@@ -5,7 +5,8 @@ use crate::cli::output::files::{NewFile, failures};
 use crate::cli::solving::SolvedImage;
 use starpipe::base::files;
 use starpipe::catalog::Catalog;
-use starpipe::doors::solve_field::{Names, lines, with_coordinates};
+use starpipe::doors::FitsFileHeader;
+use starpipe::doors::solve_field::{Names, lines};
 use starpipe::frame::ImageName;
 use starpipe::report::{FrameReport, tables, wcs};
 use std::path::Path;
@@ -70,16 +71,22 @@ impl Answer {
 
 /// The image with the coordinates of `header`: a FITS image with its own cards, others as they were read.
 fn new_image(path: &Path, solved: &SolvedImage, header: &[u8]) -> anyhow::Result<Option<Vec<u8>>> {
-    let Some(frame) = &solved.frame else {
+    let Some((frame, header)) = solved.frame.as_ref().zip(FitsFileHeader::of_file(header)) else {
         return Ok(None);
     };
     let own = files::read(path, MAX_IMAGE_BYTES).ok();
-    if let Some(copy) = own.and_then(|own| with_coordinates(&own, header)) {
+    if let Some(copy) = own.and_then(|own| with_coordinates(&own, &header)) {
         return Ok(Some(copy));
     }
     let stored = frame.clone().as_stored();
     let row_order = solved.solution.row_order.unwrap_or_default();
     let name = path.display().to_string();
     let copy = wcs::solved_copy(&name, &stored, &solved.solution, row_order)?;
-    Ok(copy.and_then(|copy| with_coordinates(&copy, header)))
+    Ok(copy.and_then(|copy| with_coordinates(&copy, &header)))
+}
+
+/// The file with the coordinates of `header`; `None` where its first header has no image, or it is no FITS file.
+fn with_coordinates(file: &[u8], header: &FitsFileHeader) -> Option<Vec<u8>> {
+    let own = FitsFileHeader::of_file(file).filter(FitsFileHeader::has_image)?;
+    Some(own.with_coordinates_of(file, header))
 }

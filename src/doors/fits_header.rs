@@ -1,13 +1,11 @@
-//! Headers of FITS with a solution: that of a frame's file, and that of `.wcs`.
+//! The primary header of a FITS file, with other coordinates.
 //!
-//! A header is the file's own, without the coordinates that it had, and with those of the solution at its end. All
-//! other cards and the data stay as they are.
+//! A header stays as it is, but for the coordinates that it had: those of a solution stand at its end.
+//!
+//! # Reference
+//! FITS Standard 4.0 (2018), sect. 4 (cards) and 8 (world coordinates); Shupe et al. 2005, ASP Conf. 347, 491 (SIP).
 
-use super::plate::Plate;
-use crate::frame::{FitsHeader, RowOrder};
-use crate::identify::SkyView;
-use crate::report::wcs;
-use crate::solve::Solution;
+use crate::frame::FitsHeader;
 
 /// Characters of a card.
 const CARD: usize = 80;
@@ -17,72 +15,16 @@ const END: &[u8] = b"END     ";
 
 type Card = [u8; CARD];
 
-/// The cards of a solution: linear, or with the distortion of the lens as `SIP` has it.
-pub fn solved_cards(
-    plate: &Plate,
-    solution: &Solution,
-    rows: RowOrder,
-    with_distortion: bool,
-    warning: Option<&str>,
-) -> FitsHeader {
-    let mut header = FitsHeader::default();
-    let found = solution.outcome.identification();
-    match found.filter(|_| with_distortion) {
-        Some(found) => {
-            let view = SkyView {
-                camera: &found.camera,
-                icrs_to_camera: &found.icrs_to_camera,
-                places: found.places,
-            };
-            wcs::add_projection(&mut header, &view, rows);
-        }
-        None => add_plane(&mut header, plate),
-    }
-    let [[x, y], [turn_x, turn_y]] = [plate.cdelt_deg(), plate.crota_deg()];
-    header.real("CDELT1", x, "X pixel size (deg)");
-    header.real("CDELT2", y, "Y pixel size (deg)");
-    header.real("CROTA1", turn_x, "Image twist of X axis (deg)");
-    header.real("CROTA2", turn_y, "Image twist of Y axis (deg)");
-    let program = concat!("solved by starpipe ", env!("CARGO_PKG_VERSION"));
-    header.logical("PLTSOLVD", true, program);
-    if let Some(warning) = warning {
-        header.text("WARNING", warning, "");
-    }
-    header
-}
-
-fn add_plane(header: &mut FitsHeader, plate: &Plate) {
-    header.text("CTYPE1", "RA---TAN", "");
-    header.text("CTYPE2", "DEC--TAN", "");
-    header.text("CUNIT1", "deg", "");
-    header.text("CUNIT2", "deg", "");
-    header.real("EQUINOX", 2000.0, "");
-    for (axis, name) in [(0, "X"), (1, "Y")] {
-        let (number, pixel) = (axis + 1, plate.crpix[axis]);
-        header.real(
-            &format!("CRPIX{number}"),
-            pixel,
-            &format!("{name} of reference pixel"),
-        );
-    }
-    header.real("CRVAL1", plate.crval_deg[0], "RA of reference pixel (deg)");
-    header.real("CRVAL2", plate.crval_deg[1], "DEC of reference pixel (deg)");
-    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        let keyword = format!("CD{}_{}", row + 1, column + 1);
-        header.real(&keyword, plate.cd_deg[row][column], "degrees a pixel");
-    }
-}
-
 /// The primary header of a FITS file.
 #[derive(Debug, Clone, Default)]
-pub struct Header {
+pub struct FitsFileHeader {
     /// Those before END.
     cards: Vec<Card>,
     /// Where the data begin.
     bytes: usize,
 }
 
-impl Header {
+impl FitsFileHeader {
     /// The header of a file; `None` of one that is not FITS, or whose header has no end.
     pub fn of_file(file: &[u8]) -> Option<Self> {
         let (cards, _) = file.as_chunks::<CARD>();
@@ -93,6 +35,11 @@ impl Header {
         })
     }
 
+    /// Whether an image is below it.
+    pub fn has_image(&self) -> bool {
+        self.integer("NAXIS").is_some_and(|axes| axes > 0)
+    }
+
     /// Whether the image below it has this size.
     pub fn is_of_image(&self, size_px: [usize; 2]) -> bool {
         let sides = ["NAXIS1", "NAXIS2"].map(|name| self.integer(name));
@@ -101,19 +48,29 @@ impl Header {
 
     /// `file`, whose header this is, with the cards of a solution.
     pub fn updated(&self, file: &[u8], solved: &FitsHeader) -> Vec<u8> {
-        let mut updated = self.solved(solved).in_blocks();
+        self.file_with(file, cards_of(solved))
+    }
+
+    /// `file`, whose header this is, with the coordinates and the history of another header.
+    pub fn with_coordinates_of(&self, file: &[u8], other: &Self) -> Vec<u8> {
+        let is_wanted = |card: &&Card| is_coordinate(keyword(card)) || keyword(card) == "HISTORY";
+        self.file_with(file, other.cards.iter().filter(is_wanted).copied())
+    }
+
+    fn file_with(&self, file: &[u8], cards: impl Iterator<Item = Card>) -> Vec<u8> {
+        let mut updated = self.with(cards).in_blocks();
         updated.extend_from_slice(file.get(self.bytes..).unwrap_or_default());
         updated
     }
 
     /// The header without an image: cards in blocks as FITS has them.
     pub fn wcs_blocks(&self, solved: &FitsHeader) -> Vec<u8> {
-        self.without_image().solved(solved).in_blocks()
+        self.without_image().with(cards_of(solved)).in_blocks()
     }
 
     /// The same with a line for each card.
     pub fn wcs_lines(&self, solved: &FitsHeader) -> Vec<u8> {
-        let header = self.without_image().solved(solved);
+        let header = self.without_image().with(cards_of(solved));
         let cards = header.cards.iter().map(|card| &card[..]);
         let lines = cards.chain([b"END".as_slice()]);
         lines
@@ -121,13 +78,15 @@ impl Header {
             .collect()
     }
 
-    fn solved(&self, solved: &FitsHeader) -> Self {
-        let kept = self
-            .cards
-            .iter()
-            .filter(|card| !is_coordinate(keyword(card)));
+    /// The same with these cards in place of its coordinates. The sum of the old header is not that of the new one.
+    fn with(&self, cards: impl Iterator<Item = Card>) -> Self {
+        let is_kept = |card: &&Card| {
+            let keyword = keyword(card);
+            !is_coordinate(keyword) && keyword != "CHECKSUM"
+        };
+        let kept = self.cards.iter().filter(is_kept).copied();
         Self {
-            cards: kept.copied().chain(cards_of(solved)).collect(),
+            cards: kept.chain(cards).collect(),
             bytes: self.bytes,
         }
     }
@@ -172,12 +131,14 @@ fn keyword(card: &Card) -> &str {
 
 /// Whether a keyword belongs to the coordinates of an image.
 fn is_coordinate(name: &str) -> bool {
-    const WHOLE: [&str; 10] = [
-        "WARNING", "WCSAXES", "LONPOLE", "LATPOLE", "RADESYS", "RADECSYS", "EQUINOX", "PLTSOLVD",
-        "CRDER1", "CRDER2",
+    const WHOLE: [&str; 9] = [
+        "WARNING", "WCSAXES", "WCSNAME", "LONPOLE", "LATPOLE", "RADESYS", "RADECSYS", "EQUINOX",
+        "PLTSOLVD",
     ];
-    const BY_AXIS: [&str; 6] = ["CTYPE", "CUNIT", "CRPIX", "CRVAL", "CDELT", "CROTA"];
-    const BY_TWO_NUMBERS: [&str; 7] = ["CD", "PC", "PV", "A_", "B_", "AP_", "BP_"];
+    const BY_AXIS: [&str; 8] = [
+        "CTYPE", "CUNIT", "CRPIX", "CRVAL", "CDELT", "CROTA", "CRDER", "CSYER",
+    ];
+    const BY_TWO_NUMBERS: [&str; 8] = ["CD", "PC", "PV", "PS", "A_", "B_", "AP_", "BP_"];
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let has_two = |text: &str| {
         let two = text.split_once('_');
@@ -229,7 +190,7 @@ mod tests {
             "OBJECT  = 'M 31'",
             "COMMENT A_0_2 of another",
         ]);
-        let header = Header::of_file(&file).unwrap();
+        let header = FitsFileHeader::of_file(&file).unwrap();
         assert!(header.is_of_image([40, 72]) && !header.is_of_image([72, 40]));
         let updated = header.updated(&file, &solved());
         assert_eq!(updated.len(), file.len());
@@ -255,7 +216,7 @@ mod tests {
             "NAXIS   =                    2",
             "NAXIS1  =  40",
         ]);
-        let header = Header::of_file(&file).unwrap();
+        let header = FitsFileHeader::of_file(&file).unwrap();
         let lines = String::from_utf8(header.wcs_lines(&solved())).unwrap();
         let lines: Vec<_> = lines.lines().map(str::trim_end).collect();
         assert_eq!(lines.len(), 5);
@@ -267,14 +228,42 @@ mod tests {
     }
 
     #[test]
+    fn coordinates_and_history_come_from_another_header() {
+        let own = file(&[
+            "SIMPLE  =                    T",
+            "NAXIS   =                    2 / axes",
+            "CRVAL1  = 1.0",
+            "CHECKSUM= 'a'",
+            "A_TEXT  = 1",
+        ]);
+        let solved = file(&[
+            "SIMPLE  =                    T",
+            "NAXIS   =                    0",
+            "IMAGEW  = 3",
+            "CRVAL1  = 2.0",
+            "HISTORY a",
+        ]);
+        let [header, other] = [&own, &solved].map(|file| FitsFileHeader::of_file(file).unwrap());
+        assert!(header.has_image() && !other.has_image());
+        let expected = file(&[
+            "SIMPLE  =                    T",
+            "NAXIS   =                    2 / axes",
+            "A_TEXT  = 1",
+            "CRVAL1  = 2.0",
+            "HISTORY a",
+        ]);
+        assert_eq!(header.with_coordinates_of(&own, &other), expected);
+    }
+
+    #[test]
     fn what_is_no_fits_has_no_header() {
-        assert!(Header::of_file(b"").is_none());
-        assert!(Header::of_file(&b"SIMPLE  = T".repeat(500)).is_none());
+        assert!(FitsFileHeader::of_file(b"").is_none());
+        assert!(FitsFileHeader::of_file(&b"SIMPLE  = T".repeat(500)).is_none());
         let mut other = file(&["XTENSION= 'IMAGE   '"]);
-        assert!(Header::of_file(&other).is_none());
+        assert!(FitsFileHeader::of_file(&other).is_none());
         other[..9].copy_from_slice(b"SIMPLE  =");
         // A file that ends in its header.
-        let header = Header::of_file(&other[..200]).unwrap();
+        let header = FitsFileHeader::of_file(&other[..200]).unwrap();
         assert_eq!(header.updated(&other[..200], &solved()).len(), BLOCK);
     }
 }
