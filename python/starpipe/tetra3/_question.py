@@ -79,7 +79,7 @@ class Question:
 
     def accepts(self, result: Result) -> bool:
         """Whether a solution is within the stated limits."""
-        match, fov = result.match, result.to_dict()["optics"]["fov_x_deg"]
+        match, fov = result.match, result._report["optics"]["fov_x_deg"]
         assert match is not None
         if 10.0**match.log10_false_alarm > self.match_threshold:
             return False

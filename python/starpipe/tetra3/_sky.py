@@ -76,8 +76,7 @@ class SkyMap:
         if not self._radial.size:
             tangent: Array = np.where(angle < np.pi / 2.0, np.tan(angle), np.nan)
             return tangent
-        radius: Array = np.polynomial.polynomial.polyval(angle, self._radial)
-        return radius
+        return np.asarray(np.polynomial.polynomial.polyval(angle, self._radial), dtype=np.float64)
 
     def _angle(self, radius: Array) -> Array:
         """Return the angle from the reference at a distance in the plane."""

@@ -57,7 +57,7 @@ def solved(result: Result, question: Question, given: Array | None) -> dict[str,
     with_distortion = question.distortion is not None
     camera = Pinhole.like(sky, size, distorted=with_distortion)
     stars = _Stars(result, sky, given)
-    optics = result.to_dict()["optics"]
+    optics = result._report["optics"]
     residuals = np.sort(stars.residuals_px) * ARCSEC_PER_RAD / optics["focal_length_px"]
     (ra, dec), roll = ra_dec_of(rotation[0]).tolist(), np.arctan2(rotation[1, 2], rotation[2, 2])
     solution = {
