@@ -279,6 +279,24 @@ def test_an_image_gives_what_was_simulated(solver, shot):
         assert found["T_extract"] > 0.0 and found["T_solve"] > 0.0
 
 
+def test_stars_that_were_not_measured_are_where_they_should_be(solver):
+    # The Trapezium in Orion, four stars that are one extended spot here.
+    shot = sp.simulate("nanosat-tracker", ra=83.8, dec=-1.0, roll=25.0, exposure=2.0)
+    found = solver.solve_from_image(
+        shot.image, return_catalog=True, return_matches=True, return_visual=True
+    )
+    matched = {tuple(star) for star in found["matched_stars"]}
+    missed = [star for star in found["catalog_stars"] if star[:3] not in matched]
+    assert len(found["catalog_stars"]) == found["Matches"] + len(missed)
+    (star,) = [star for star in missed if abs(star[2] - 5.13) < 0.01]
+    np.testing.assert_allclose(star[:2], [83.8186, -5.3897], atol=3e-3)
+    x, y = shot.wcs.world_to_pixel_values(*star[:2])
+    np.testing.assert_allclose(star[3:], [y + 0.5, x + 0.5], atol=0.5)
+    radius = 0.01 * shot.image.shape[1]
+    colors = np.array(found["visual"])[round(star[3]), round(star[4] - radius) - 2 :][:5]
+    assert (colors == (255, 0, 0)).all(axis=-1).any()
+
+
 def test_centroids_are_at_the_true_places_of_the_stars(shot):
     truth = shot.columns
     brightest = np.argsort(truth["vmag"])[:10]
