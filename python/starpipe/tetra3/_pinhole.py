@@ -12,7 +12,7 @@ from ._sky import Array, SkyMap, directions_of, ra_dec_of
 WIDEST_RAD = np.radians(75.0)
 """Largest angle from the center at which a lens is described as a pinhole."""
 
-SAMPLES = 25
+SAMPLES = 15
 """Places along each side of a frame at which its lens is compared with a pinhole."""
 
 STEPS = 30

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
@@ -31,7 +32,7 @@ class SkyMap:
         self._reference = np.array([cards["CRPIX1"], cards["CRPIX2"]]) - 0.5
         numbers = [cards[f"CD{row}_{column}"] for row in (1, 2) for column in (1, 2)]
         self._linear = np.radians(np.reshape(numbers, (2, 2)))
-        self._terms = [_terms(cards, "A"), _terms(cards, "B")]
+        self._bends = [_coefficients(cards, "A"), _coefficients(cards, "B")]
         angles = {int(name[4:]): value for name, value in cards.items() if name.startswith("PV2_")}
         # The distance in the plane as a polynomial of the angle; empty for the tangent.
         self._radial = np.zeros(max(angles, default=-1) + 1)
@@ -68,25 +69,24 @@ class SkyMap:
     def _bend(self, offset: Array) -> Array:
         """Return what SIP adds to offsets from the reference."""
         x, y = offset[..., 0], offset[..., 1]
-        bends = [sum((c * x**p * y**q for p, q, c in terms), 0.0 * x) for terms in self._terms]
-        return np.stack(bends, axis=-1)
+        return np.stack([polynomial.polyval2d(x, y, bend) for bend in self._bends], axis=-1)
 
     def _radius(self, angle: Array) -> Array:
         """Return the distance from the reference in the plane."""
         if not self._radial.size:
             tangent: Array = np.where(angle < np.pi / 2.0, np.tan(angle), np.nan)
             return tangent
-        return np.asarray(np.polynomial.polynomial.polyval(angle, self._radial), dtype=np.float64)
+        return np.asarray(polynomial.polyval(angle, self._radial), dtype=np.float64)
 
     def _angle(self, radius: Array) -> Array:
         """Return the angle from the reference at a distance in the plane."""
         if not self._radial.size:
             return np.arctan(radius)
-        slope = np.polynomial.polynomial.polyder(self._radial)
+        slope = polynomial.polyder(self._radial)
         angle: Array = radius / self._radial[1]
         for _ in range(STEPS):
             step = self._radius(angle) - radius
-            angle = angle - step / np.polynomial.polynomial.polyval(angle, slope)
+            angle = angle - step / polynomial.polyval(angle, slope)
             angle = np.clip(angle, 0.0, np.pi)
         return np.where(np.abs(self._radius(angle) - radius) < 1e-9, angle, np.nan)
 
@@ -100,10 +100,11 @@ def _cards(header: bytes) -> Iterator[tuple[str, float]]:
             yield found[1], float(found[2].replace("D", "E"))
 
 
-def _terms(cards: dict[str, float], name: str) -> list[tuple[int, int, float]]:
-    """Return the terms of a polynomial of SIP: the powers of x and y, and the coefficient."""
-    found = ((re.fullmatch(rf"{name}_(\d+)_(\d+)", key), value) for key, value in cards.items())
-    return [(int(key[1]), int(key[2]), value) for key, value in found if key]
+def _coefficients(cards: dict[str, float], name: str) -> Array:
+    """Return the coefficients of a polynomial of SIP, by the powers of x and y."""
+    order = int(cards.get(f"{name}_ORDER", 0))
+    powers = range(order + 1)
+    return np.array([[cards.get(f"{name}_{p}_{q}", 0.0) for q in powers] for p in powers])
 
 
 def _axes(ra_rad: float, dec_rad: float) -> Array:
