@@ -11,7 +11,11 @@ from astropy.io import fits
 from conftest import REPOSITORY
 from PIL import Image
 
-PAGES = [*sorted((REPOSITORY / "docs" / "python").glob("*.md")), REPOSITORY / "python/README.md"]
+PAGES = [
+    *sorted((REPOSITORY / "docs" / "python").glob("*.md")),
+    REPOSITORY / "docs/doors/tetra3.md",
+    REPOSITORY / "python/README.md",
+]
 
 
 def code_of(page):
