@@ -21,7 +21,9 @@ pub fn with_coordinates(image: &[u8], header: &[u8]) -> Option<Vec<u8>> {
         return None;
     }
     let (solved, _) = split(header)?;
-    let own = cards.into_iter().filter(|card| !is_coordinate(card));
+    // The sum of the old header is not that of the new one.
+    let is_kept = |card: &&[u8]| !is_coordinate(card) && keyword(card) != "CHECKSUM";
+    let own = cards.into_iter().filter(is_kept);
     let is_new = |card: &&[u8]| is_coordinate(card) || keyword(card) == "HISTORY";
     let mut bytes: Vec<u8> = own
         .chain(solved.into_iter().filter(is_new))
@@ -84,6 +86,7 @@ mod tests {
             "NAXIS   =    2 / axes",
             "CRVAL1  = 1.0",
             "PCOUNT  = 0",
+            "CHECKSUM= 'a'",
             "A_0_2   = 1",
             "A_TEXT  = 1",
         ];
