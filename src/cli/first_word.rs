@@ -49,7 +49,7 @@ pub(crate) fn completed(
 ) -> Result<Vec<OsString>, clap::Error> {
     let mut words: Vec<OsString> = words.collect();
     if let Some(command) = words.first().and_then(|name| other_program(name)) {
-        words.insert(1, command.into());
+        words.splice(..1, ["starpipe".into(), command.into()]);
         return Ok(in_own_words(words));
     }
     let Some(first) = words.get(1) else {

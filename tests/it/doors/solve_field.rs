@@ -187,6 +187,7 @@ fn the_program_answers_to_the_name_of_the_other() {
     let unknown = run(&["--bogus", "a.fits"]);
     assert_eq!(unknown.status, 2);
     assert!(unknown.stderr.contains("--bogus"), "{}", unknown.stderr);
+    assert!(unknown.stderr.contains("starpipe solve-field ["));
     assert_eq!(run(&["--ra", "north", "a.fits"]).status, 2);
     assert_eq!(run(&[]).status, 2);
 }
