@@ -125,17 +125,15 @@ impl StarList {
 /// The half-flux diameter of a star in pixels; `None` where it has no light, is too near to the border, or is too
 /// wide or too narrow for a star.
 fn half_flux_diameter_px(frame: &Frame, centre: &PixelPoint) -> Option<f64> {
-    /// Wide enough for the first look at any star.
-    const FIRST_RADIUS_PX: f64 = 14.0;
-    /// Radius with nearly all light, in diameters: 4.4 σ of a Gaussian.
-    const RADIUS: f64 = 1.75;
-    const LEAST_RADIUS_PX: f64 = 4.0;
-    const ROUNDS: usize = 6;
+    /// Radius with nearly all light, in diameters: 3.8 σ of a Gaussian.
+    const RADIUS: f64 = 1.5;
+    const FIRST_RADIUS_PX: f64 = 4.0;
+    const ROUNDS: usize = 8;
     let mut radius_px = FIRST_RADIUS_PX;
     let mut diameter_px = within(frame, centre, radius_px)?;
-    // A smaller circle has fewer neighbors and less noise.
+    // The circle grows as long as the star does: a large one has neighbors and noise in it.
     for _ in 0..ROUNDS {
-        let next_px = (RADIUS * diameter_px).max(LEAST_RADIUS_PX);
+        let next_px = (RADIUS * diameter_px).max(FIRST_RADIUS_PX);
         if (next_px - radius_px).abs() < 0.1 {
             break;
         }
@@ -148,9 +146,10 @@ fn half_flux_diameter_px(frame: &Frame, centre: &PixelPoint) -> Option<f64> {
 
 /// Twice the mean distance of the light within a radius.
 fn within(frame: &Frame, centre: &PixelPoint, radius_px: f64) -> Option<f64> {
-    /// Width of the ring that the background is measured in, in pixels.
-    const RING_PX: f64 = 2.0;
-    let outer_px = radius_px + RING_PX;
+    /// Smallest inner radius of the ring that the background is measured in, and its width, in pixels.
+    const RING_PX: [f64; 2] = [14.0, 5.0];
+    let inner_px = RING_PX[0].max(radius_px + 1.0);
+    let outer_px = inner_px + RING_PX[1];
     let range = |middle: f64, side: usize| {
         let (low, high) = ((middle - outer_px).ceil(), (middle + outer_px).floor());
         let is_inside = low >= 0.0 && high < side as f64;
@@ -168,14 +167,13 @@ fn within(frame: &Frame, centre: &PixelPoint, radius_px: f64) -> Option<f64> {
     let pixels: Vec<(f64, f64)> = pixels.filter(|(_, level)| level.is_finite()).collect();
     let ring = pixels
         .iter()
-        .filter(|(distance, _)| (radius_px..outer_px).contains(distance));
+        .filter(|(distance, _)| (inner_px..outer_px).contains(distance));
     let background = median_of(ring.map(|(_, level)| *level))?;
-    let mut light = [0.0, 0.0];
+    let (mut total, mut moment) = (0.0, 0.0);
     for (distance, level) in pixels.iter().filter(|(distance, _)| *distance < radius_px) {
-        light[0] += level - background;
-        light[1] += (level - background) * distance;
+        total += level - background;
+        moment += (level - background) * distance;
     }
-    let [total, moment] = light;
     (total > 0.0 && moment > 0.0).then(|| 2.0 * moment / total)
 }
 

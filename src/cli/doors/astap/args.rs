@@ -8,14 +8,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    override_usage = "astap -f <FILE> [OPTIONS]\n       starpipe astap -f <FILE> [OPTIONS]",
+    after_help = "Examples:\n  \
     astap -f night.fits -fov 1.5 -ra 5.58 -spd 89.6 -r 10\n  \
     astap -f night.tif -o results/night -wcs\n  \
     starpipe astap -f night.fits -analyse 30\n\n\
     Options may have one dash, as ASTAP's have. Its options -s, -t, -m, -z, -check, -speed, -progress and\n\
     -debug are accepted, and not needed. Hints may be wrong: they are tried first.\n\
     Exit status: 0 solved, 1 no solution, 2 not enough stars, 16 the frame cannot be read,\n\
-    34 the header cannot be updated.")]
+    34 the header cannot be updated."
+)]
 pub(crate) struct AstapArgs {
     /// Frame to solve
     #[arg(short = 'f', value_name = "FILE")]
