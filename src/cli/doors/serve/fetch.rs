@@ -6,8 +6,7 @@
 //! # Reference
 //! IANA registries of special-purpose addresses (RFC 6890, 2013).
 
-use super::Server;
-use super::body::{Received, receive};
+use super::body::{Limits, Received, receive};
 use super::refusal::{NovaRefusal, Refusal};
 use axum::body::Body;
 use axum::http::{Request, Response, Uri, header};
@@ -27,14 +26,14 @@ const STEP: Duration = Duration::from_secs(10);
 ///
 /// # Errors
 /// If the address is not public, or gives no picture in time.
-pub(super) async fn fetch(server: &Server, url: &str) -> Result<Received, NovaRefusal> {
+pub(super) async fn fetch(limits: &Limits, url: &str) -> Result<Received, NovaRefusal> {
     let mut target = Target::parse(url)?;
     for _ in 0..=MAX_REDIRECTIONS {
         let response = timeout(STEP, target.get()).await;
         let response = response.map_err(|_| refused("the address does not answer in time"))??;
         let status = response.status();
         if status.is_success() {
-            return Ok(receive(server, response.into_body()).await?);
+            return Ok(receive(limits, response.into_body()).await?);
         }
         if !status.is_redirection() {
             return Err(refused(&format!(

@@ -3,7 +3,7 @@
 use axum::body::Body;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
+use serde_json::Value;
 use starpipe::base::format::printable;
 
 /// JSON, as nova.astrometry.net calls it; its clients ask for that.
@@ -18,11 +18,8 @@ pub(super) fn reply(kind: &'static str, content: impl Into<Body>) -> Response {
 }
 
 /// A reply of the protocol of nova.astrometry.net.
-pub(super) fn nova_reply(answer: &impl Serialize) -> Response {
-    match serde_json::to_string(answer) {
-        Ok(text) => reply(NOVA_JSON, text),
-        Err(error) => super::refusal::Refusal::internal(&error.into()).into_response(),
-    }
+pub(super) fn nova_reply(answer: &Value) -> Response {
+    reply(NOVA_JSON, answer.to_string())
 }
 
 /// A header as text; empty where it is absent.

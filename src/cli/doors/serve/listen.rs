@@ -1,7 +1,7 @@
 //! Connections: accepted until a signal comes, limited in number and in time.
 
-use super::Server;
 use super::routes;
+use super::server::Server;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
@@ -53,7 +53,7 @@ impl Listening {
         let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
         let mut http = http1::Builder::new();
         http.timer(TokioTimer::new())
-            .header_read_timeout(server.send_time)
+            .header_read_timeout(server.limits.send_time)
             .max_buf_size(MAX_HEAD_BYTES);
         tracing::info!("listening on http://{}", listener.local_addr()?);
         loop {
@@ -77,7 +77,7 @@ impl Listening {
         let most = Duration::try_from_secs_f64(most_s)
             .unwrap_or(LIFE)
             .min(LIFE)
-            + server.send_time;
+            + server.limits.send_time;
         tokio::select! {
             () = graceful.shutdown() => {}
             () = tokio::time::sleep(most) => {}

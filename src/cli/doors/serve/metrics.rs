@@ -1,6 +1,5 @@
 //! Counters for monitoring, in the text format of Prometheus.
 
-use super::Server;
 use std::fmt::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -75,8 +74,8 @@ impl Metrics {
         }
     }
 
-    /// The counters as text.
-    pub(super) fn text(&self, server: &Server) -> String {
+    /// The counters as text, with how many frames wait, and how much of jobs is kept.
+    pub(super) fn text(&self, waiting: usize, kept_bytes: u64) -> String {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let mut text = String::new();
         let mut add = |name: &str, kind: &str, help: &str, values: &[(String, String)]| {
@@ -110,7 +109,7 @@ impl Metrics {
             "Requests that were answered.",
             &requests,
         );
-        let waiting = one(server.queue.len() as u64);
+        let waiting = one(waiting as u64);
         add("queue_length", "gauge", "Frames that wait.", &waiting);
         add(
             "running",
@@ -128,7 +127,7 @@ impl Metrics {
             "folder_bytes",
             "gauge",
             "What is kept of jobs.",
-            &one(server.store.bytes()),
+            &one(kept_bytes),
         );
         let mut sum = 0;
         let mut classes: Vec<_> = CLASSES_S

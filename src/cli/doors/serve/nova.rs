@@ -3,9 +3,11 @@
 use super::body::{Received, receive};
 use super::http::{TEXT, nova_reply, reply, shown_name, text_of};
 use super::refusal::{NovaRefusal, Refusal};
+use super::server::Server;
 use super::store::{Job, JobResult};
-use super::worker::{WCS, Wanted, Work, input_of_job, now};
-use super::{Server, fetch, solve};
+use super::work::{Wanted, Work};
+use super::worker::{WCS, input_of_job, now};
+use super::{fetch, solve};
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, header};
 use axum::response::Response;
@@ -30,7 +32,7 @@ struct Call {
 impl Call {
     async fn receive(server: &Server, request: Request) -> Result<Self, NovaRefusal> {
         let kind = text_of(request.headers(), header::CONTENT_TYPE).to_owned();
-        let body = receive(server, request.into_body()).await?;
+        let body = receive(&server.limits, request.into_body()).await?;
         if kind.starts_with("application/json") {
             let arguments = arguments(&body.bytes)?;
             return Ok(Self {
@@ -109,7 +111,7 @@ pub(super) async fn url_upload(State(server): Shared, request: Request) -> Answe
         let message = "this server fetches no addresses; upload the file (or start the server with --allow-url)";
         return Err(NovaRefusal::of_call(message));
     }
-    let content = fetch::fetch(&server, &url).await?;
+    let content = fetch::fetch(&server.limits, &url).await?;
     let path = url.split(['?', '#']).next();
     submit(&server, shown_name(path), call.arguments, content).await
 }

@@ -1,9 +1,10 @@
 //! Which address answers what, and what all answers have.
 
 use super::http::{JSON, TEXT, reply};
-use super::pages::OPENAPI;
+use super::page::OPENAPI;
 use super::refusal::Refusal;
-use super::{Server, nova, pages, solve};
+use super::server::Server;
+use super::{nova, solve};
 use axum::Router;
 use axum::extract::{Request, State};
 use axum::http::uri::{PathAndQuery, Uri};
@@ -61,8 +62,7 @@ pub(super) fn router(server: Arc<Server>) -> Router {
         .route("/health", get(|| async { reply(TEXT, "ok\n") }))
         .route("/metrics", get(metrics))
         .route("/openapi.json", get(|| async { reply(JSON, OPENAPI) }))
-        .route("/", get(pages::index))
-        .fallback(pages::file)
+        .fallback(get(file))
         .method_not_allowed_fallback(|| async {
             Refusal::new(StatusCode::METHOD_NOT_ALLOWED, "not with this method")
         })
@@ -73,7 +73,20 @@ pub(super) fn router(server: Arc<Server>) -> Router {
 }
 
 async fn metrics(State(server): State<Arc<Server>>) -> Response {
-    reply(TEXT, server.metrics.text(&server))
+    let (waiting, kept_bytes) = (server.queue.len(), server.store.bytes());
+    reply(TEXT, server.metrics.text(waiting, kept_bytes))
+}
+
+/// A file of the page.
+async fn file(State(server): State<Arc<Server>>, request: Request) -> Result<Response, Refusal> {
+    let name = request.uri().path().trim_start_matches('/').to_owned();
+    solve::blocking(move || {
+        let file = server.page.file(&name);
+        let (kind, content) = file.ok_or_else(|| Refusal::unknown("such address"))?;
+        let content = content.map_err(|error| Refusal::internal(&error))?;
+        Ok(reply(kind, content))
+    })
+    .await
 }
 
 /// What is done for each request: its address is tidied, a foreign page is refused, and its answer is logged.

@@ -1,11 +1,10 @@
 //! `POST /solve`: a frame in, the JSON of `process` out.
 
-use super::Server;
 use super::body::receive;
 use super::http::{JSON, reply, shown_name, text_of};
 use super::refusal::Refusal;
-use super::worker;
-use super::worker::{Input, Request as Work, Wanted};
+use super::server::Server;
+use super::work::{Input, Request as Asked, Wanted, Work};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::Response;
@@ -30,7 +29,7 @@ pub(super) async fn solve(
     stated.add_all(&query);
     check_key(&server, request.headers(), &stated)?;
     let kind = text_of(request.headers(), header::CONTENT_TYPE).to_owned();
-    let body = receive(&server, request.into_body()).await?;
+    let body = receive(&server.limits, request.into_body()).await?;
     let content = if form::is_multipart(&kind) {
         let whole = body.bytes.clone();
         let parts = form::parts(&kind, &whole).map_err(Refusal::invalid)?;
@@ -110,12 +109,12 @@ pub(super) async fn answered(
 ) -> Result<Vec<u8>, Refusal> {
     let place = server.queue.place().ok_or_else(no_place)?;
     let (answer, answered) = oneshot::channel();
-    let request = Work {
+    let request = Asked {
         input,
         wanted,
         answer,
     };
-    place.fill(worker::Work::Request(Box::new(request)));
+    place.fill(Work::Request(Box::new(request)));
     match tokio::time::timeout(MAX_WAIT, answered).await {
         Ok(Ok(made)) => made,
         Ok(Err(_)) => Err(Refusal::busy("the server is ending")),

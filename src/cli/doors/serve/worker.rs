@@ -1,10 +1,11 @@
 //! The threads that solve frames.
 
-use super::Server;
 use super::body::Received;
 use super::metrics::Ending;
 use super::refusal::Refusal;
+use super::server::Server;
 use super::store::JobResult;
+use super::work::{Input, Request, Wanted, Work};
 use crate::cli::output::messages::one_line;
 use crate::cli::solving::{SolvedImage, SolvingPlan};
 use anyhow::{Context as _, anyhow};
@@ -17,49 +18,9 @@ use starpipe::identify::IndexedCatalog;
 use starpipe::report::overlay::{self, OverlayFormat, OverlayOptions, Rings, Shown, SkyLayers};
 use starpipe::report::tables::{self, TableFormat};
 use starpipe::report::{FrameReport, wcs};
-use starpipe::solve::{
-    DeepSky, SolveOptions, Workspace, solve_centroids, solve_guarded, solve_read,
-};
+use starpipe::solve::{DeepSky, Workspace, solve_centroids, solve_guarded, solve_read};
 use std::path::Path;
 use std::time::Instant;
-use tokio::sync::oneshot;
-
-/// What waits for a worker.
-pub(super) enum Work {
-    /// A job of the store.
-    Job(u64),
-    /// A request whose client waits.
-    Request(Box<Request>),
-}
-
-/// A frame, and what its client wants of it.
-pub(super) struct Request {
-    pub(super) input: Input,
-    pub(super) wanted: Wanted,
-    pub(super) answer: oneshot::Sender<Result<Vec<u8>, Refusal>>,
-}
-
-/// A frame, or a list of stars, and what is stated for it.
-pub(super) struct Input {
-    pub(super) name: String,
-    pub(super) content: Received,
-    pub(super) options: SolveOptions,
-    /// The settings of an upload, whose hints may be wrong.
-    pub(super) upload: Option<Upload>,
-}
-
-/// What is made of a solved frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
-    /// The report as JSON.
-    Report,
-    /// The frame with its stars named.
-    Annotated,
-    /// The frame with all detections marked.
-    Detections,
-    /// A copy with coordinates.
-    SolvedCopy,
-}
 
 /// Name and content of a file.
 type ResultFile = (&'static str, Vec<u8>);

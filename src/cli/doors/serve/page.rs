@@ -1,15 +1,10 @@
-//! What a browser shows: the built-in form, or the files of a page.
+//! What a browser is shown: the built-in form, or the files of a page.
 
-use super::Server;
-use super::http::{HTML, JSON, TEXT, reply};
-use super::refusal::Refusal;
+use super::http::{HTML, JSON, TEXT};
 use anyhow::{Context, bail};
-use axum::extract::{Request, State};
-use axum::response::Response;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// The description of the routes.
 pub(super) const OPENAPI: &str = include_str!("../../../../docs/doors/openapi.json");
@@ -44,36 +39,17 @@ impl Page {
         }
         Ok(page)
     }
-}
 
-/// `/`
-pub(super) async fn index(State(server): State<Arc<Server>>) -> Result<Response, Refusal> {
-    match server.page.0.is_empty() {
-        true => Ok(reply(HTML, FORM)),
-        false => named(&server, INDEX).await,
+    /// The kind and the content of a file: `None` if there is none of this name.
+    pub(super) fn file(&self, name: &str) -> Option<(&'static str, anyhow::Result<Vec<u8>>)> {
+        if self.0.is_empty() && name.is_empty() {
+            return Some((HTML, Ok(FORM.into())));
+        }
+        let name = if name.is_empty() { INDEX } else { name };
+        let path = self.0.get(name)?;
+        let content = fs::read(path).with_context(|| format!("reading {}", path.display()));
+        Some((kind_of(path), content))
     }
-}
-
-/// A file of the page.
-pub(super) async fn file(
-    State(server): State<Arc<Server>>,
-    request: Request,
-) -> Result<Response, Refusal> {
-    let path = request.uri().path();
-    named(&server, path.strip_prefix('/').unwrap_or(path)).await
-}
-
-async fn named(server: &Server, name: &str) -> Result<Response, Refusal> {
-    let path = server.page.0.get(name);
-    let path = path.ok_or_else(|| Refusal::unknown("such address"))?;
-    let content = tokio::task::spawn_blocking({
-        let path = path.clone();
-        move || fs::read(path)
-    });
-    let content = content.await.map_err(anyhow::Error::from);
-    let content = content.and_then(|content| Ok(content?));
-    let content = content.map_err(|error| Refusal::internal(&error))?;
-    Ok(reply(kind_of(path), content))
 }
 
 fn kind_of(path: &Path) -> &'static str {

@@ -1,0 +1,44 @@
+//! What waits for a worker.
+
+use super::body::Received;
+use super::refusal::Refusal;
+use starpipe::doors::nova::Upload;
+use starpipe::solve::SolveOptions;
+use tokio::sync::oneshot;
+
+/// What waits for a worker.
+pub(super) enum Work {
+    /// A job of the store.
+    Job(u64),
+    /// A request whose client waits.
+    Request(Box<Request>),
+}
+
+/// A frame, and what its client wants of it.
+pub(super) struct Request {
+    pub(super) input: Input,
+    pub(super) wanted: Wanted,
+    pub(super) answer: oneshot::Sender<Result<Vec<u8>, Refusal>>,
+}
+
+/// A frame, or a list of stars, and what is stated for it.
+pub(super) struct Input {
+    pub(super) name: String,
+    pub(super) content: Received,
+    pub(super) options: SolveOptions,
+    /// The settings of an upload, whose hints may be wrong.
+    pub(super) upload: Option<Upload>,
+}
+
+/// What is made of a solved frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// The report as JSON.
+    Report,
+    /// The frame with its stars named.
+    Annotated,
+    /// The frame with all detections marked.
+    Detections,
+    /// A copy with coordinates.
+    SolvedCopy,
+}
