@@ -50,7 +50,7 @@ pub use error::Error;
 pub use error::remedies_of;
 pub use fixed_camera::FixedCamera;
 pub use named_options::SolveOptionError;
-pub use note::{Note, OtherDirection};
+pub use note::{Note, OtherDirection, OtherScale};
 pub use options::SolveOptions;
 pub use outcome::{Outcome, Reason};
 pub use place_time::{Change, Contradiction, PlaceTime, Proposal};

@@ -68,12 +68,7 @@ pub enum Note {
     /// The sky of a frame that is not identified fills a circle, as by an all-sky lens.
     RoundPicture(Circle),
     /// A scale that was tried first is not that of the frame.
-    OtherScale {
-        /// Whether the frame's header gives it, or else the program that calls.
-        is_of_header: bool,
-        /// Smallest and largest pixel scale that it allows, in radians.
-        pixel_scale_rad: [f64; 2],
-    },
+    OtherScale(OtherScale),
     /// The frame's centre is not where it was stated to be.
     OtherDirection(OtherDirection),
     /// Site, date and attitude contradict each other: the centre was below the horizon.
@@ -168,10 +163,8 @@ impl Note {
             Self::ColorMosaic(_) => "color_mosaic",
             Self::MoreStars { .. } => "more_stars",
             Self::RoundPicture(_) => "round_picture",
-            Self::OtherScale {
-                is_of_header: true, ..
-            } => "header_scale_wrong",
-            Self::OtherScale { .. } => "scale_wrong",
+            Self::OtherScale(scale) if scale.is_of_header => "header_scale_wrong",
+            Self::OtherScale(_) => "scale_wrong",
             Self::OtherDirection(_) => "direction_wrong",
             Self::BelowHorizon { .. } => "below_horizon",
             Self::SiteOrTime(_) => "site_or_time_wrong",
@@ -271,10 +264,11 @@ impl Note {
         let found = outcome.identification()?;
         let [low_rad, high_rad] = scale.pixel_scale_range_rad(found.camera.width_px);
         let is_wrong = !(low_rad..=high_rad).contains(&(1.0 / found.camera.focal_length_px()));
-        is_wrong.then_some(Self::OtherScale {
+        let stated = OtherScale {
             is_of_header: scale.source == ScaleSource::Header,
             pixel_scale_rad: [low_rad, high_rad],
-        })
+        };
+        is_wrong.then_some(Self::OtherScale(stated))
     }
 
     /// A direction that was stated, where it is not the true one.
@@ -462,6 +456,26 @@ impl fmt::Display for OtherDirection {
     }
 }
 
+/// A scale that was stated for a frame, and is not its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtherScale {
+    /// Whether the frame's header gives it, or else the program that calls.
+    pub is_of_header: bool,
+    /// Smallest and largest pixel scale that it allows, in radians.
+    pub pixel_scale_rad: [f64; 2],
+}
+
+impl fmt::Display for OtherScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [low, high] = self.pixel_scale_rad.map(|rad| rad * ARCSEC_PER_RAD);
+        f.write_str(match self.is_of_header {
+            true => "the header's focal length and pixel size do not fit this frame: they give ",
+            false => "the scale that was given does not fit this frame: it is ",
+        })?;
+        write!(f, "{low:.1}″ to {high:.1}″ per pixel")
+    }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -489,10 +503,7 @@ impl fmt::Display for Note {
             Self::LensOfOtherSize { known_px, found_px } => {
                 write_other_size(f, *known_px, *found_px)
             }
-            Self::OtherScale {
-                is_of_header,
-                pixel_scale_rad,
-            } => write_other_scale(f, *is_of_header, *pixel_scale_rad),
+            Self::OtherScale(scale) => scale.fmt(f),
             Self::OtherDirection(direction) => direction.fmt(f),
             Self::BelowHorizon { depth_rad } => write!(
                 f,
@@ -567,20 +578,6 @@ fn write_guessed_size(
         "; the standard error of the frame's center is {x:.0} px along x and {y:.0} px along y, and the stated errors \
          include it"
     )
-}
-
-fn write_other_scale(
-    f: &mut fmt::Formatter<'_>,
-    is_of_header: bool,
-    pixel_scale_rad: [f64; 2],
-) -> fmt::Result {
-    let [low, high] = pixel_scale_rad.map(|rad| rad * ARCSEC_PER_RAD);
-    if is_of_header {
-        f.write_str("the header's focal length and pixel size do not fit this frame: they give ")?;
-    } else {
-        f.write_str("the scale that was given does not fit this frame: it is ")?;
-    }
-    write!(f, "{low:.1}″ to {high:.1}″ per pixel")
 }
 
 fn write_double(f: &mut fmt::Formatter<'_>, double: &DoubleImage) -> fmt::Result {

@@ -21,8 +21,8 @@ use std::path::PathBuf;
     starpipe solve-field --scale-units arcsecperpix --scale-low 39 --scale-high 41 --ra 296.8 --dec 11.3 --radius 5 night.jpg\n  \
     starpipe solve-field --width 1024 --height 768 --x-column X_IMAGE --y-column Y_IMAGE stars.xyls\n\n\
     Called by the name solve-field, as by a link, starpipe takes these options at once. Those of solve-field that are\n\
-    not listed are known and without effect. FILE without a directory that is none is not written; %s in its name\n\
-    stands for the directory and the name of the input."
+    not listed are known and without effect. A FILE called none is not written; %s in its name stands for the\n\
+    directory and the name of the input."
 )]
 pub(crate) struct SolveFieldArgs {
     /// Images, or lists of centroids (FITS tables with the columns X and Y)
