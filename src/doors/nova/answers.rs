@@ -91,7 +91,11 @@ pub struct JobAnswers {
 impl JobAnswers {
     /// The answers for a picture, or a list of stars.
     pub fn new(report: &FrameReport, solution: &Solution) -> Self {
-        let marked = report.annotations.iter();
+        // The number of a star in its catalogue says nothing to people.
+        let has_name = |shown: &&AnnotationReport| {
+            shown.kind != "star" || shown.id.as_ref() != Some(&shown.name)
+        };
+        let marked = report.annotations.iter().filter(has_name);
         let notes = report.notes.iter().map(|note| NoteOfJob {
             code: note.code.to_owned(),
             text: note.text.clone(),
@@ -127,16 +131,20 @@ fn marked_object(report: &FrameReport, shown: &AnnotationReport) -> MarkedObject
         ("deep_sky", _) => "ngc",
         (kind, _) => kind,
     };
-    // A star is known by its name; the number in its catalogue says nothing to people.
-    let designation = shown.id.iter().filter(|_| shown.kind == "deep_sky");
-    let designation = designation.filter(|id| **id != shown.name);
+    let names = match kind {
+        "bright" => vec![shown.label.clone()],
+        _ => {
+            let others = shown.id.iter().filter(|id| **id != shown.name);
+            std::iter::once(&shown.name)
+                .chain(others)
+                .cloned()
+                .collect()
+        }
+    };
     let [pixelx, pixely] = report.file_pixel(&PixelPoint::new(shown.x, shown.y));
     MarkedObject {
         kind: kind.to_owned(),
-        names: std::iter::once(&shown.name)
-            .chain(designation)
-            .cloned()
-            .collect(),
+        names,
         pixelx,
         pixely,
         radius: shown.radius_px.unwrap_or(0.0),

@@ -233,7 +233,7 @@ fn an_upload_is_answered_as_process_answers() {
     let annotations = report["annotations"].as_array().unwrap();
     let expected = annotations
         .iter()
-        .find(|object| object["name"] == "Rigel")
+        .find(|object| object["label"] == "Rigel")
         .unwrap();
     near(
         &rigel["pixelx"],
