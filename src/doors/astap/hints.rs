@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn the_height_gives_the_scale() {
         let hints = Hints {
-            height_deg: Some(4.7974),
+            height_deg: Some(4.7972),
             ..Hints::default()
         };
         let prior = hints.scale(480).unwrap();

@@ -71,7 +71,7 @@ pub(crate) fn translated(words: Vec<OsString>) -> Vec<OsString> {
             // An option of this program.
             Some(name) if name.starts_with('-') => {
                 own.push(word);
-                own.extend(rest.next_if(|next| is_value(next)));
+                own.extend(rest.next_if(is_value));
                 continue;
             }
             Some(name) => name,
@@ -80,7 +80,7 @@ pub(crate) fn translated(words: Vec<OsString>) -> Vec<OsString> {
                 continue;
             }
         };
-        let value = rest.next_if(|next| is_value(next));
+        let value = rest.next_if(is_value);
         match (kind_of(name), value) {
             (Some(Kind::Value), Some(value)) => own.push(joined(name, &value)),
             (Some(Kind::ValueOr(usual)), value) => {
