@@ -48,6 +48,8 @@ const server = createServer((request, response) => {
   const name = decodeURIComponent(new URL(request.url, "http://localhost").pathname).replace(/\/$/, "/index.html");
   const file = path.join(dist, name);
   if (!file.startsWith(dist) || !existsSync(file)) return response.writeHead(404).end();
+  // Whether this server solves pictures, which it does not.
+  if (request.method === "HEAD") return response.writeHead(200).end();
   const { body, encoding } = packed(path.relative(dist, file));
   response.writeHead(200, { "content-type": TYPES[path.extname(file)] ?? "application/octet-stream", "cache-control": "max-age=600", "content-length": body.length, ...encoding });
   send(response, body);

@@ -4,6 +4,7 @@ import { byId } from "./dom.js";
 import { Engine, Stopped } from "./engine.js";
 import { BUILD, NUMBERS, STARS } from "./files.js";
 import { bytesOf } from "./program.js";
+import { isSolving, wantsKey } from "./server.js";
 import { clearAll, keepAnswer, keepPicture, keptAnswer, keptPictures } from "./store.js";
 import { showFrame } from "./views.js";
 
@@ -32,6 +33,7 @@ const HAS_IMAGES = /\.(tiff?|fits?|fts|fz|gz)$/i;
  * @property {string} options
  * @property {Record<string, File>} equipment
  * @property {number} images
+ * @property {boolean} isRemote Whether the server solves it. Who gave it was told so.
  * @property {Answer | null} result What is in storage is not in memory, too.
  * @property {string} error
  * @property {HTMLButtonElement} button
@@ -40,6 +42,10 @@ const HAS_IMAGES = /\.(tiff?|fits?|fts|fz|gz)$/i;
 /** @type {Picture[]} */ const pictures = [];
 /** @type {Picture | null} */ let chosen = null;
 /** @type {Picture | null} */ let running = null;
+/** Whether the server of this page solves what is given. */
+let isRemote = false;
+/** The address of the page that solves on the device, though its server could. */
+const HERE = "?browser";
 let isReady = false;
 /** Whether it ever was: the index is kept since, and soon there. */
 let wasReady = false;
@@ -89,6 +95,8 @@ const tellAmount = (stage, share) => {
 };
 
 const tellStage = (stage, share) => {
+  // The server does not tell how far it is.
+  if (running ? running.isRemote : isRemote) return;
   tellAmount(stage, share);
   const at = STAGES.findIndex(([name]) => name === stage);
   if (at < 0) return;
@@ -127,7 +135,7 @@ const tellWhetherEmpty = () => {
   } catch { /* it jumps a little */ }
 };
 
-const keep = ({ file, id, state, status, tries, options, equipment, images, error }) => keepPicture({ file, id, state, status, tries, options, equipment, images, error, build: BUILD });
+const keep = ({ file, id, state, status, tries, options, equipment, images, isRemote, error }) => keepPicture({ file, id, state, status, tries, options, equipment, images, isRemote, error, build: BUILD });
 
 /** @param {Partial<Picture> & { file: File }} given @returns {Picture} */
 const enqueue = (given) => {
@@ -135,7 +143,7 @@ const enqueue = (given) => {
   button.type = "button";
   const id = pictures.reduce((most, { id }) => Math.max(most, id), 0) + 1;
   /** @type {Picture} */
-  const picture = { id, state: "waits", status: "", tries: 0, options: stated(true), equipment: equipment(), images: 1, result: null, error: "", button, ...given };
+  const picture = { id, state: "waits", status: "", tries: 0, options: stated(true), equipment: equipment(), images: 1, isRemote, result: null, error: "", button, ...given };
   button.addEventListener("click", () => choose(picture));
   const item = document.createElement("li");
   item.appendChild(button);
@@ -165,7 +173,8 @@ const restore = async () => {
     // Answers of another version do not fit this one.
     if (wasSolving || (kept.state === "done" && build !== BUILD)) kept.state = "waits";
     if (wasSolving && kept.tries >= MOST_TRIES) Object.assign(kept, { state: "failed", error: `${kept.file.name} was not solved: the page was closed or crashed during each attempt.` });
-    enqueue(kept);
+    // What was given to be solved on the device stays there.
+    enqueue({ ...kept, isRemote: isRemote && kept.isRemote === true });
   }
   if (pictures.length) choose(pictures.find(({ state }) => state === "done") ?? pictures[0]);
   next();
@@ -236,14 +245,28 @@ const showPreview = async (picture) => {
   } catch { /* the solution tells why */ }
 };
 
-/** @param {Picture} picture */
-const solve = async (picture) => {
+/** What is done with a picture, in words. @param {Picture} picture */
+const doing = ({ file, isRemote }) => (isRemote ? `${file.name} is sent to the server, which solves it.` : `${file.name} is being solved.`);
+
+/** What a call takes of a picture that is solved on the device. @param {Picture} picture */
+const given = (picture) => [key(picture), picture.file, picture.options, picture.equipment];
+
+/** The same for the server. @param {Picture} picture */
+const givenThere = ({ file, options }) => [file, options, byId("server-key").value.trim()];
+
+/** Prepares the catalog. @param {Picture} picture */
+const prepare = async (picture) => {
   if (!wasReady) glance(picture);
   const givenUp = new Promise((_, reject) => { giveUp = () => reject(new Stopped("stopped")); });
   await Promise.race([engine.call("prepare"), givenUp]);
   isReady = wasReady = true;
-  tell(`${picture.file.name} is being solved.`);
-  const answer = await engine.call("solve", key(picture), picture.file, picture.options, picture.equipment);
+  tell(doing(picture));
+};
+
+/** @param {Picture} picture */
+const solve = async (picture) => {
+  if (!picture.isRemote) await prepare(picture);
+  const answer = await (picture.isRemote ? engine.call("solveThere", ...givenThere(picture)) : engine.call("solve", ...given(picture)));
   Object.assign(picture, { state: "done", status: JSON.parse(answer.json).status, tries: 0, result: answer });
   const isKept = await keepAnswer(picture.id, answer);
   // Without storage, memory has to do.
@@ -260,7 +283,10 @@ const next = async () => {
   label(picture);
   byId("cancel").hidden = false;
   byId("work").setAttribute("aria-busy", "true");
-  tell(isReady ? `${picture.file.name} is being solved.` : preparing);
+  byId("work").classList.toggle("on-server", picture.isRemote);
+  if (picture.isRemote) byId("done").removeAttribute("value");
+  else byId("done").value = 0;
+  tell(isReady || picture.isRemote ? doing(picture) : preparing);
   keep(picture);
   try {
     await solve(picture);
@@ -270,6 +296,7 @@ const next = async () => {
     picture.error = error instanceof Stopped ? `${picture.file.name} was canceled.` : error.message;
     isReady = !(error instanceof Stopped) && isReady;
     if (pictures.includes(picture)) tell(picture.error, true);
+    if (wantsKey(picture.error)) byId("key-label").hidden = false;
   }
   running = null;
   byId("cancel").hidden = true;
@@ -284,7 +311,7 @@ const next = async () => {
 
 /** Ends what runs. */
 const stop = () => {
-  if (isReady) engine.stop();
+  if (isReady || running?.isRemote) engine.stop();
   else giveUp();
   scout.stop();
 };
@@ -343,7 +370,9 @@ const layers = () => {
 /** Buttons for the answer: what many want, then the files. @param {Picture} picture @param {any} report @param {Answer} result */
 const buttons = (picture, report, result) => {
   const stem = picture.file.name.replace(/(\.fits)?\.[^.]*$/i, "");
-  const draw = async (kind, type) => new Blob([await engine.call("draw", key(picture), picture.file, picture.options, picture.equipment, kind, layers())], { type });
+  /** @param {string} kind */
+  const made = (kind) => (picture.isRemote ? engine.call("drawThere", ...givenThere(picture), kind, layers()) : engine.call("draw", ...given(picture), kind, layers()));
+  const draw = async (kind, type) => new Blob([await made(kind)], { type });
   const saveDrawn = (kind, type, extension) => draw(kind, type).then((blob) => save(blob, `${stem}.${extension}`), (error) => tell(error.message, true));
   /** @type {[string, (button: HTMLButtonElement) => unknown][]} */
   const first = [["Save the annotated picture", () => saveDrawn("overlay", "image/png", "annotated.png")]];
@@ -390,7 +419,7 @@ const addExample = async (name) => {
 const takeShared = async () => {
   try {
     const cache = await caches.open(SHARED_CACHE);
-    if (location.search) history.replaceState(null, "", location.pathname + location.hash);
+    if (location.search === "?shared") history.replaceState(null, "", location.pathname + location.hash);
     const files = await Promise.all((await cache.keys()).map(async (request) => {
       const response = await cache.match(request);
       await cache.delete(request);
@@ -399,6 +428,23 @@ const takeShared = async () => {
     }));
     if (files.length) await add(files.filter((file) => file !== undefined));
   } catch { /* a browser without such storage has no such apps */ }
+};
+
+/** Finds out who solves what is given, and says so before anything is. */
+const tellWhere = async () => {
+  const isServed = await isSolving();
+  isRemote = isServed && location.search !== HERE;
+  byId("promise").hidden = isRemote;
+  byId("promise").classList.remove("unknown");
+  byId("where").hidden = !isServed;
+  byId("where-text").textContent = isRemote ? `Pictures are sent to this server, ${location.host}, which solves them.` : "Pictures are solved in this browser, and stay on this device.";
+  byId("where-link").textContent = isRemote ? "Solve in this browser instead" : `Solve on ${location.host} instead`;
+  byId("where-link").href = isRemote ? HERE : "./";
+  // The server takes pictures alone.
+  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-here]"))) {
+    label.hidden = isRemote;
+    label.querySelector("input").disabled = isRemote;
+  }
 };
 
 /** What is there before any picture. @type {Promise<void>} */ let restored = Promise.resolve();
@@ -431,15 +477,16 @@ export const photo = () => {
   byId("hint-form").addEventListener("submit", (event) => {
     event.preventDefault();
     if (!chosen || chosen.state === "runs") return;
-    Object.assign(chosen, { state: "waits", options: stated(), equipment: equipment(), result: null, error: "", tries: 0 });
+    Object.assign(chosen, { state: "waits", options: stated(), equipment: equipment(), isRemote, result: null, error: "", tries: 0 });
     choose(chosen, true);
     next();
   });
-  restored = restore();
+  const told = tellWhere();
+  restored = told.then(restore);
   restored.then(takeShared).then(tellWhetherEmpty);
   engine.call("version").then((version) => { byId("version").textContent = version; }, (error) => tell(error.message, true));
-  return engine.call("prepare").then(() => {
-    isReady = wasReady = true;
+  return told.then(() => (isRemote ? undefined : engine.call("prepare"))).then(() => {
+    if (!isRemote) isReady = wasReady = true;
     if (!running) tell("Ready for your picture.");
   }, (error) => { if (!(error instanceof Stopped)) tell(error.message, true); });
 };

@@ -33,6 +33,8 @@ addEventListener("activate", (event) => {
 });
 addEventListener("fetch", (event) => {
   if (event.request.method === "POST" && new URL(event.request.url).pathname.endsWith("/share")) return event.respondWith(takeShared(event.request));
+  // The page asks so whether its server solves pictures. None does without a network: a failure would be an error in the log.
+  if (event.request.method === "HEAD") return event.respondWith(fetch(event.request).catch(() => new Response()));
   if (event.request.method !== "GET") return;
   event.respondWith(caches.match(event.request, { ignoreSearch: true, cacheName: CACHE }).then((kept) => kept ?? fetch(event.request)));
 });

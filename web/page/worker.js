@@ -3,6 +3,7 @@
 import { isTruncated, wholeRows } from "./cut.js";
 import { NUMBERS, STARS } from "./files.js";
 import { readable } from "./readable.js";
+import { drawThere, solveThere } from "./server.js";
 import init, * as starpipe from "./starpipe.js";
 
 /** The browser's storage for the index of the catalog. */
@@ -111,19 +112,30 @@ const equipmentOf = async ({ camera, dark, flat }) => {
 };
 
 /**
+ * What `solve` makes of a file, and what is to be said of the file.
+ * @template T @param {File} file @param {(bytes: Uint8Array) => T | Promise<T>} solve
+ */
+const solveFile = async (file, solve) => {
+  const { bytes, said } = await readable(file);
+  try {
+    return { solved: await solve(bytes), said };
+  } catch (error) {
+    if (!isTruncated(error)) throw error;
+    await ready;
+    const part = wholeRows(bytes, (bytes) => whyNot(() => starpipe.preview(bytes, file.name)));
+    if (!part) throw error;
+    return { solved: await solve(part.bytes), said: `The file is cut off: this is the answer for its first ${part.rows} of ${part.height} rows.` };
+  }
+};
+
+/**
  * The frame, and what is to be said of its file.
  * @param {starpipe.Solver} solver @param {File} file @param {string} options @param {EquipmentFiles} files
  */
 const solveWith = async (solver, file, options, files) => {
-  const [{ bytes, said }, equipment] = await Promise.all([readable(file), equipmentOf(files)]);
-  /** @param {Uint8Array} bytes */
-  const solve = (bytes) => solver.solve(bytes, file.name, options, equipment);
+  const equipment = await equipmentOf(files);
   try {
-    return { solved: solve(bytes), said };
-  } catch (error) {
-    const part = isTruncated(error) && wholeRows(bytes, (bytes) => whyNot(() => starpipe.preview(bytes, file.name)));
-    if (!part) throw error;
-    return { solved: solve(part.bytes), said: `The file is cut off: this is the answer for its first ${part.rows} of ${part.height} rows.` };
+    return await solveFile(file, (bytes) => solver.solve(bytes, file.name, options, equipment));
   } finally {
     equipment.free();
   }
@@ -174,11 +186,23 @@ const calls = {
   defocus: (study) => starpipe.defocus(study),
 };
 
+/** What the server does: it needs no program here. */
+const callsOfServer = {
+  solveThere: async (file, options, key) => {
+    const { solved, said } = await solveFile(file, (bytes) => solveThere(bytes, file.name, options, key));
+    return { ...solved, said };
+  },
+  drawThere: async (file, options, key, kind, layers) => {
+    const { solved } = await solveFile(file, (bytes) => drawThere(bytes, file.name, options, key, kind, layers));
+    return solved;
+  },
+};
+
 onmessage = async ({ data: { id, call, values, module } }) => {
   if (module) return begin(module);
   try {
-    await ready;
-    postMessage({ id, value: await calls[call](...values) });
+    if (!(call in callsOfServer)) await ready;
+    postMessage({ id, value: await (callsOfServer[call] ?? calls[call])(...values) });
   } catch (error) {
     // A trap leaves the module in an unknown state.
     const isFatal = error instanceof WebAssembly.RuntimeError || error instanceof RangeError;

@@ -310,6 +310,47 @@ fn solve_answers_with_the_json_of_process() {
 }
 
 #[test]
+fn solve_answers_with_other_results_of_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[]);
+    let out = folder.path().join("out");
+    let report = processed(Some(&out));
+    let made = |answer: &str| {
+        let reply = server.solve(&format!("?name=orion.png&answer={answer}"), &orion());
+        assert_eq!(reply.status, 200, "{answer}");
+        reply.body
+    };
+    let written = |name: &str| fs::read(out.join(name)).unwrap();
+    let table = String::from_utf8(written("orion.csv")).unwrap();
+    let table = table.replace(ORION, "orion.png");
+    assert_eq!(String::from_utf8(made("csv")).unwrap(), table);
+    assert_eq!(cards(&made("wcs")), cards(&written("orion.wcs")));
+    assert!(made("png") == written("orion.png"));
+    let plain = server.solve("?answer=png&rings=none&draw=none", &orion());
+    let drawn = server.solve("?answer=png&rings=all&draw=grid", &orion());
+    assert_eq!((plain.status, drawn.status), (200, 200));
+    assert_ne!(plain.body, drawn.body);
+    let html = server.solve("?name=orion.png&answer=html", &orion());
+    assert!(html.head.contains("content-type: text/html"));
+    let view = server.solve("?name=orion.png&answer=view&page=1", &orion());
+    let view = view.json();
+    let shown: Value = serde_json::from_str(view["json"].as_str().unwrap()).unwrap();
+    assert_eq!(shown["attitude"], report["attitude"]);
+    let data: Value = serde_json::from_str(view["data"].as_str().unwrap()).unwrap();
+    assert!(data.is_object() && view["html"].as_str().unwrap().contains("id=\"view\""));
+    for (status, query) in [
+        (400, "?answer=xml"),
+        (400, "?draw=grid"),
+        (400, "?page=0"),
+        (422, "?page=2"),
+    ] {
+        assert_eq!(server.solve(query, &orion()).status, status, "{query}");
+    }
+    let pgm = [b"P5 64 64 255\n".to_vec(), vec![9; 64 * 64]].concat();
+    assert_eq!(server.solve("?answer=wcs", &pgm).status, 422);
+}
+
+#[test]
 fn hints_that_are_wrong_are_dropped_and_the_notes_say_so() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[]);
@@ -607,6 +648,7 @@ fn answers_have_headers_for_browsers() {
         for name in [
             "content-security-policy: default-src 'none'",
             "x-content-type-options: nosniff",
+            "starpipe: serve",
         ] {
             assert!(head.contains(name), "{path}: {head}");
         }

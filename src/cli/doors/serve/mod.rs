@@ -2,7 +2,7 @@
 //!
 //! Requests are answered on one thread (`listen`, `routes`): what they bring is limited while it is read (`body`).
 //! Frames wait in the `queue`, or in the folder of jobs (`store`), and are solved by threads of their own
-//! (`worker`).
+//! (`worker`), which make what is wanted of them (`making`).
 
 mod args;
 mod body;
@@ -10,6 +10,7 @@ mod fetch;
 mod http;
 mod keys;
 mod listen;
+mod making;
 mod metrics;
 mod nova;
 mod page;

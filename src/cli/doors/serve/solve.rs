@@ -1,7 +1,7 @@
-//! `POST /solve`: a frame in, the JSON of `process` out.
+//! `POST /solve`: a frame in, the JSON of `process` out, or another of its results.
 
 use super::body::receive;
-use super::http::{JSON, reply, shown_name, text_of};
+use super::http::{reply, shown_name, text_of};
 use super::refusal::Refusal;
 use super::server::Server;
 use super::work::{Input, Request as Asked, Wanted, Work};
@@ -11,6 +11,7 @@ use axum::response::Response;
 use starpipe::doors::nova::form::{self, Part};
 use starpipe::solve::SolveOptions;
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -41,20 +42,24 @@ pub(super) async fn solve(
     } else {
         body
     };
+    let wanted = stated.wanted()?;
     let input = Input {
         name: shown_name(stated.name.as_deref()),
         content,
         options: stated.options(&server.options)?,
+        page: stated.page()?,
         upload: None,
     };
-    let line = answered(&server, input, Wanted::Report).await?;
-    Ok(reply(JSON, line))
+    let made = answered(&server, input, wanted).await?;
+    Ok(reply(wanted.kind(), made))
 }
 
 /// What a request states.
 #[derive(Default)]
 struct Stated {
     options: BTreeMap<String, String>,
+    /// What is no option of the solution, by name.
+    other: BTreeMap<String, String>,
     name: Option<String>,
     key: Option<String>,
 }
@@ -68,9 +73,26 @@ impl Stated {
                 _ if value.is_empty() => {}
                 "name" => self.name = Some(value),
                 "key" => self.key = Some(value),
+                name @ ("answer" | "draw" | "page" | "rings") => {
+                    self.other.insert(name.to_owned(), value);
+                }
                 name => drop(self.options.insert(name.replace('-', "_"), value)),
             }
         }
+    }
+
+    fn other(&self, name: &str) -> Option<&str> {
+        self.other.get(name).map(String::as_str)
+    }
+
+    fn wanted(&self) -> Result<Wanted, Refusal> {
+        let [answer, rings, draw] = ["answer", "rings", "draw"].map(|name| self.other(name));
+        Wanted::stated(answer, rings, draw).map_err(Refusal::invalid)
+    }
+
+    fn page(&self) -> Result<Option<NonZeroUsize>, Refusal> {
+        let number = self.other("page").map(str::parse).transpose();
+        number.map_err(|_| Refusal::invalid("page must be the number of an image, from 1"))
     }
 
     /// The options of the server with what is stated, within its time limit.

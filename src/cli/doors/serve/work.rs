@@ -3,7 +3,9 @@
 use super::body::Received;
 use super::refusal::Refusal;
 use starpipe::doors::nova::Upload;
+use starpipe::report::overlay::{Rings, SkyLayers};
 use starpipe::solve::SolveOptions;
+use std::num::NonZeroUsize;
 use tokio::sync::oneshot;
 
 /// What waits for a worker.
@@ -26,6 +28,8 @@ pub(super) struct Input {
     pub(super) name: String,
     pub(super) content: Received,
     pub(super) options: SolveOptions,
+    /// Which image of a file with several, from 1; by default the main one.
+    pub(super) page: Option<NonZeroUsize>,
     /// The settings of an upload, whose hints may be wrong.
     pub(super) upload: Option<Upload>,
 }
@@ -35,6 +39,16 @@ pub(super) struct Input {
 pub(super) enum Wanted {
     /// The report as JSON.
     Report,
+    /// What the page shows: the report, and the elements and data of its view.
+    View,
+    /// The page of `process --html`.
+    Html,
+    /// The detections as a table.
+    Csv,
+    /// The coordinates as a FITS header.
+    Wcs,
+    /// The frame as PNG, with these marks.
+    Picture(Rings, SkyLayers),
     /// The frame with its stars named.
     Annotated,
     /// The frame with all detections marked.

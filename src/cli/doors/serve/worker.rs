@@ -1,21 +1,20 @@
 //! The threads that solve frames.
 
 use super::body::Received;
+use super::making;
 use super::metrics::Ending;
 use super::refusal::Refusal;
 use super::server::Server;
 use super::store::JobResult;
-use super::work::{Input, Request, Wanted, Work};
+use super::work::{Input, Request, Work};
 use crate::cli::output::messages::one_line;
 use crate::cli::solving::{SolvedImage, SolvingPlan};
-use anyhow::{Context as _, anyhow};
+use anyhow::Context as _;
 use jiff::Timestamp;
 use starpipe::base::panics::caught;
-use starpipe::catalog::Catalog;
 use starpipe::doors::nova::{JobAnswers, Upload};
-use starpipe::frame::{self, Buffers, Colors, MemoryLimit, RowOrder};
+use starpipe::frame::{self, Buffers, MemoryLimit};
 use starpipe::identify::IndexedCatalog;
-use starpipe::report::overlay::{self, OverlayFormat, OverlayOptions, Rings, Shown, SkyLayers};
 use starpipe::report::tables::{self, TableFormat};
 use starpipe::report::{FrameReport, wcs};
 use starpipe::solve::{DeepSky, Workspace, solve_centroids, solve_guarded, solve_read};
@@ -58,7 +57,14 @@ impl Solver<'_> {
             return;
         }
         let made = self.timed(&request.input, workspace, |solved, workspace| {
-            self.made(request.wanted, &request.input, solved, workspace)
+            let (wanted, catalog) = (request.wanted, self.indexed.catalog());
+            making::made(
+                wanted,
+                &request.input,
+                solved,
+                catalog,
+                &mut workspace.frames,
+            )
         });
         let made = made.map_err(|error| Refusal::of_frame(&error));
         // A client that has gone needs no answer.
@@ -164,7 +170,7 @@ impl Solver<'_> {
                 });
             }
             let read = |buffers: &mut Buffers| {
-                let frame = frame::read_stream(content, None, buffers);
+                let frame = frame::read_stream(content, input.page, buffers);
                 frame.map_err(|error| error.in_file(name))
             };
             let (solution, frame) = solve_read(name, read, &context, workspace)?;
@@ -172,44 +178,6 @@ impl Solver<'_> {
             Ok(SolvedImage { solution, frame })
         })
     }
-
-    fn made(
-        &self,
-        wanted: Wanted,
-        input: &Input,
-        solved: &SolvedImage,
-        workspace: &mut Workspace,
-    ) -> anyhow::Result<Vec<u8>> {
-        let SolvedImage { solution, frame } = solved;
-        let catalog: &Catalog = self.indexed.catalog();
-        if wanted == Wanted::Report {
-            let report = FrameReport::new(&input.name, solution, catalog);
-            return Ok((report.to_json_line()? + "\n").into_bytes());
-        }
-        let frame = frame.as_ref();
-        let frame = frame.ok_or_else(|| anyhow!("a list of stars has no picture"))?;
-        if wanted == Wanted::SolvedCopy {
-            let copy = wcs::solved_copy(&input.name, frame, solution, RowOrder::TopDown)?;
-            return copy.ok_or_else(|| anyhow!("the picture is not identified"));
-        }
-        let options = overlay_options(wanted);
-        let colors = Colors::decode(&input.content.bytes, frame, &mut workspace.frames);
-        let mut shown = Shown::new(&input.name, frame);
-        shown.colors = colors.as_ref();
-        Ok(overlay::encoded(&shown, solution, catalog, &options)?)
-    }
-}
-
-fn overlay_options(wanted: Wanted) -> OverlayOptions {
-    let mut options = OverlayOptions::default();
-    match wanted {
-        Wanted::Annotated => options.format = OverlayFormat::Jpeg,
-        _ => {
-            options.rings = Rings::All;
-            options.sky = SkyLayers::NONE;
-        }
-    }
-    options
 }
 
 /// The result file with the coordinates.
@@ -224,6 +192,7 @@ pub(super) fn input_of_job(server: &Server, number: u64) -> anyhow::Result<Input
         name: job.name,
         content: Received::kept(server.store.upload(number)?),
         options: upload.in_options(server.options.clone()),
+        page: None,
         upload: Some(upload),
     })
 }
