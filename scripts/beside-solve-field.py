@@ -56,7 +56,7 @@ def run(command, frame, directory, hints):
     begun = time.monotonic()
     done = subprocess.run(
         [*command, "--overwrite", "--no-plots", "--dir", str(directory), *hints, str(frame)],
-        capture_output=True, text=True, errors="replace",
+        check=False, capture_output=True, text=True, errors="replace",
     )
     return done, time.monotonic() - begun
 
@@ -80,10 +80,11 @@ def unread(files):
                 units.verify("exception")
                 if suffix in (".wcs", ".new"):
                     WCS(units[0].header)
-                    units[0].data
+                    if suffix == ".new" and units[0].data is None:
+                        wrong.append(suffix)
                 elif len(units[1].data) == 0:
                     wrong.append(suffix)
-        except Exception as error:
+        except (OSError, ValueError, TypeError, IndexError) as error:
             wrong.append(f"{suffix} ({error})")
     return wrong
 

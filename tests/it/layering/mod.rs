@@ -121,7 +121,6 @@ const ROOMS: &[(&str, &[&str])] = &[
         &[
             "base",
             "centroids",
-            "detect",
             "frame",
             "identify",
             "report",
