@@ -45,12 +45,13 @@ pub fn angle_deg(a: (f64, f64), b: (f64, f64)) -> f64 {
     2.0 * (chord_sq.sqrt() / 2.0).asin().to_degrees()
 }
 
-/// The numbers of a FITS header by keyword.
+/// The numbers of the first header of a FITS file by keyword.
 pub fn header(path: &Path) -> HashMap<String, f64> {
     let bytes = fs::read(path).unwrap();
     assert_eq!(bytes.len() % 2880, 0);
     let cards = bytes
         .chunks(80)
+        .take_while(|card| !card.starts_with(b"END     "))
         .map(|card| std::str::from_utf8(card).unwrap());
     cards
         .filter(|card| &card[8..10] == "= ")
