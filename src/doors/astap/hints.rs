@@ -6,8 +6,9 @@ use crate::doors::{ScaleRange, ScaleUnit};
 use crate::identify::ScalePrior;
 use crate::solve::SolveOptions;
 
-/// Tolerance of the field's height, as a fraction.
-const TOLERANCE: f64 = 0.1;
+/// The true scale in units of the stated one: heights are right to 10 %, and StellarSolver may state the low end of
+/// the width, 0.9 of it, of frames up to 16:9.
+const FACTORS: [f64; 2] = [0.58, 1.11];
 /// Widest radius that restricts the search, in degrees.
 const MAX_RADIUS_DEG: f64 = 90.0;
 
@@ -30,8 +31,8 @@ impl Hints {
         let middle = self.pixel_arcsec(height_px)?;
         let range = ScaleRange {
             unit: ScaleUnit::ArcsecondsPerPixel,
-            low: Some(middle * (1.0 - TOLERANCE)),
-            high: Some(middle * (1.0 + TOLERANCE)),
+            low: Some(middle * FACTORS[0]),
+            high: Some(middle * FACTORS[1]),
         };
         range.prior()
     }
@@ -87,8 +88,8 @@ mod tests {
         let prior = hints.scale(480).unwrap();
         assert!(!prior.is_binding());
         let [low, high] = prior.pixel_scale_range_rad(1.0);
-        assert!((low / RAD_PER_ARCSEC - 32.4).abs() < 0.01);
-        assert!((high / RAD_PER_ARCSEC - 39.6).abs() < 0.01);
+        assert!((low / RAD_PER_ARCSEC - 20.88).abs() < 0.01);
+        assert!((high / RAD_PER_ARCSEC - 39.96).abs() < 0.01);
         assert_eq!(hints.warning(&turned(false)), None);
         for height_deg in [None, Some(0.0), Some(-3.0), Some(f64::NAN)] {
             assert_eq!(

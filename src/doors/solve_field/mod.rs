@@ -1,6 +1,6 @@
 //! What does `solve-field` of astrometry.net print?
 //!
-//! [`Solution`](crate::solve::Solution) → the [`lines`] that its callers read. Its tables are those of
+//! [`Solution`](crate::solve::Solution) → the [`lines()`] that its callers read. Its tables are those of
 //! [`tables`](crate::report::tables).
 //!
 //! # Reference
