@@ -118,14 +118,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ),
     (
         "doors",
-        &[
-            "base",
-            "centroids",
-            "frame",
-            "identify",
-            "report",
-            "solve",
-        ],
+        &["base", "centroids", "frame", "identify", "report", "solve"],
     ),
     (
         "night",
