@@ -206,8 +206,11 @@ mod tests {
                 .get_opts()
                 .filter(|argument| !argument.is_hide_set())
             {
-                let name = argument.get_long().unwrap();
-                assert!(long.contains(&format!("--{name}")), "{name}");
+                let name = match (argument.get_long(), argument.get_short()) {
+                    (Some(long), _) => format!("--{long}"),
+                    (None, short) => format!("-{}", short.unwrap()),
+                };
+                assert!(long.contains(&name), "{name}");
             }
         }
     }
