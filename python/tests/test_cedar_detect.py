@@ -132,6 +132,10 @@ def test_options_are_honored(channel, drawn):
     region = {"origin_x": 10, "origin_y": 5, "width": 40, "height": 30}
     result = ask(channel, brighter, estimate_background_region=region)
     assert result.background_estimate == pytest.approx(BACKGROUND + 7.0, abs=0.3)
+    # No pixel is near the mean of these two.
+    brighter[:1, :2] = 10, 200
+    two = {"width": 2, "height": 1}
+    assert ask(channel, brighter, estimate_background_region=two).background_estimate == 10.0
     dark = ask(channel, np.zeros(SHAPE, np.uint8))
     assert dark.HasField("background_estimate") and dark.background_estimate == 0.0
     assert len(dark.star_candidates) == 0 and dark.peak_star_pixel == 255
@@ -227,7 +231,8 @@ def test_a_server_that_cannot_start_says_why():
         assert "cannot listen on" in output(*SERVER, "--port", address.split(":")[-1])
         process.send_signal(signal.SIGINT)
         assert process.wait(TIMEOUT_S) == 0
-    assert "invalid" in output(*SERVER, "--port", "65536")
+    for port in ("65536", "-1", "any"):
+        assert "from 0 to 65535" in output(*SERVER, f"--port={port}")
     code = "import sys; sys.modules['grpc'] = None; sys.argv[1:] = []; "
     code += "from starpipe.tetra3.cedar_detect_server import main; main()"
     assert "pip install grpcio protobuf" in output(sys.executable, "-c", code)

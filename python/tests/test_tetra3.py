@@ -119,6 +119,9 @@ def test_distortion_and_field_are_those_at_half_the_width(solver, sky, k):
     assert found["FOV"] == pytest.approx(FOV, abs=5e-3)
     assert found["RA"] == pytest.approx(CENTER[0], abs=1e-3)
     assert solver.solve_from_centroids(centroids, SIZE, distortion=None)["distortion"] is None
+    # The scale in the middle differs by more than that from the one of the whole field.
+    narrow = solver.solve_from_centroids(centroids, SIZE, fov_estimate=FOV, fov_max_error=0.1)
+    assert narrow["FOV"] == pytest.approx(FOV, abs=5e-3)
 
 
 def test_targets_are_where_they_were_put(solver, sky):
@@ -179,6 +182,14 @@ def test_matches_are_the_given_centroids_with_their_stars(solver, sky, catalog):
     )
 
 
+def test_a_centroid_that_is_not_a_number_is_passed_over(solver, sky):
+    centroids = sky(rotation(*CENTER, 10.0))
+    given = np.insert(centroids, 7, np.nan, axis=0)
+    matched = solver.solve_from_centroids(given, SIZE, return_matches=True)["matched_centroids"]
+    assert len(matched) > 40
+    assert {tuple(place) for place in matched} <= {tuple(place) for place in centroids.tolist()}
+
+
 def test_transformations_invert_each_other_and_are_those_of_the_camera(solver, sky):
     matrix, k = rotation(*CENTER, 250.0), 0.04
     found = solver.solve_from_centroids(sky(matrix, k), SIZE, return_rotation_matrix=True)
@@ -189,6 +200,23 @@ def test_transformations_invert_each_other_and_are_those_of_the_camera(solver, s
     np.testing.assert_allclose(pixels, project(vectors(places[:2]), matrix, k), atol=0.1)
     back = tetra3.transform_to_celestial_coords(pixels, *camera)
     np.testing.assert_allclose(back, places[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize("k", [-0.2, 0.01, 0.1])
+def test_places_far_outside_the_frame_have_no_pixels(k):
+    # Of the whole sky: with pincushion distortion, most directions have no place in the picture.
+    directions = np.random.default_rng(5).normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ra, dec = np.degrees([np.arctan2(*directions.T[1::-1]), np.arcsin(directions[:, 2])])
+    matrix = rotation(*CENTER, 40.0)
+    camera = (SIZE[1], SIZE[0], FOV, matrix, k)
+    pixels = tetra3.transform_to_image_coords(np.stack([ra, dec], axis=-1), *camera)
+    inside = project(directions[directions @ matrix[0] > 0.9], matrix, k)
+    inside = ((inside > 0.0) & (inside < SIZE)).all(axis=1)
+    assert len(pixels) == inside.sum() > 50
+    back = vectors(tetra3.transform_to_celestial_coords(pixels, *camera))
+    apart = np.linalg.norm(back[:, None] - directions, axis=-1).min(axis=1)
+    assert apart.max() < 1e-8
 
 
 def test_a_wrong_estimate_is_dropped_but_a_stated_error_is_kept(solver, sky):

@@ -130,7 +130,9 @@ def _region(request: Any, pixels: Pixels) -> Pixels | None:
 
 def _background(region: Pixels, noise: float) -> float:
     """Return the mean level of the pixels without stars."""
-    distance = np.abs(region - np.median(region))
+    # The level of a pixel: the mean of two levels can be far from all pixels.
+    median = np.percentile(region, 50.0, method="lower").astype(np.float64)
+    distance = np.abs(region - median)
     # One level is the least difference of two pixels.
     return float(region[distance <= max(CLIP_SIGMA * noise, 1.0)].mean())
 

@@ -18,6 +18,9 @@ SAMPLES = 15
 STEPS = 30
 """Steps of the iteration that finds where the lens puts a star."""
 
+TOLERANCE = 1e-9
+"""Largest error with which it is found, in units of half the width."""
+
 
 @dataclass(frozen=True)
 class Pinhole:
@@ -42,6 +45,19 @@ class Pinhole:
     fov_deg: float
     distortion: float
     rotation: Array
+
+    @classmethod
+    def of_solution(
+        cls,
+        width: float,
+        height: float,
+        fov: float,
+        rotation_matrix: ArrayLike,
+        distortion: float | None,
+    ) -> Pinhole:
+        """Return the camera that a solution describes."""
+        size, rotation = (float(height), float(width)), np.asarray(rotation_matrix)
+        return cls(size, float(fov), distortion or 0.0, rotation)
 
     @classmethod
     def like(cls, sky: SkyMap, size: tuple[float, float], *, distorted: bool) -> Pinhole | None:
@@ -69,7 +85,7 @@ class Pinhole:
         """Return the unit vectors (ICRS) of pixels (y, x)."""
         offset = (np.asarray(pixels, dtype=np.float64) - _center(self.size)) / self._half_width
         square = (offset**2).sum(axis=-1, keepdims=True)
-        undone = offset * (1.0 - self.distortion * square) / (1.0 - self.distortion)
+        undone = offset * self._undoing(square)
         # Rows grow downward and columns to the right.
         along = -undone[..., ::-1] * np.tan(np.radians(self.fov_deg) / 2.0)
         place = np.concatenate([np.ones_like(square), along], axis=-1)
@@ -77,7 +93,7 @@ class Pinhole:
         return directions
 
     def pixels(self, directions: ArrayLike) -> Array:
-        """Return the pixels (y, x) of directions; NaN for those behind the camera."""
+        """Return the pixels (y, x) of directions; NaN for those that the lens does not show."""
         place = np.asarray(directions, dtype=np.float64) @ self.rotation.T
         ahead = np.where(place[..., :1] > 0.0, place[..., :1], np.nan)
         ideal = -(place[..., 1:] / ahead / np.tan(np.radians(self.fov_deg) / 2.0))[..., ::-1]
@@ -90,13 +106,23 @@ class Pinhole:
     def _half_width(self) -> float:
         return self.size[1] / 2.0
 
+    def _undoing(self, square: Array) -> Array:
+        """Return the factor that takes the distortion from a distance whose square is known."""
+        return (1.0 - self.distortion * square) / (1.0 - self.distortion)
+
     def _distorted(self, ideal: Array) -> Array:
-        """Return the distance from the center at which the lens shows an ideal one (Newton)."""
+        """Return the distance from the center at which the lens shows an ideal one (Newton).
+
+        NaN if there is none: with pincushion distortion, what is farther out has no place.
+        """
         k, radius = self.distortion, ideal
-        for _ in range(STEPS):
-            error = radius * (1.0 - k * radius**2) / (1.0 - k) - ideal
-            radius = radius - error * (1.0 - k) / (1.0 - 3.0 * k * radius**2)
-        return radius
+        with np.errstate(all="ignore"):
+            for _ in range(STEPS):
+                error = radius * self._undoing(radius**2) - ideal
+                radius = radius - error * (1.0 - k) / (1.0 - 3.0 * k * radius**2)
+            error = radius * self._undoing(radius**2) - ideal
+        # Without a solution the last step is anywhere, also inside the frame.
+        return np.where((radius >= 0.0) & (np.abs(error) < TOLERANCE), radius, np.nan)
 
 
 def rotation_of(sky: SkyMap, size: tuple[float, float]) -> Array:
@@ -140,9 +166,8 @@ def transform_to_image_coords(
     fov, rotation_matrix, distortion
         ``FOV``, ``rotation_matrix`` and ``distortion`` of a solution.
     """
-    size = (float(height), float(width))
-    camera = Pinhole(size, float(fov), distortion or 0.0, np.asarray(rotation_matrix))
-    pixels = within(camera.pixels(directions_of(celestial_coords)), size)
+    camera = Pinhole.of_solution(width, height, fov, rotation_matrix, distortion)
+    pixels = within(camera.pixels(directions_of(celestial_coords)), camera.size)
     return [pixel for pixel in pixels if np.isfinite(pixel).all()]
 
 
@@ -165,7 +190,6 @@ def transform_to_celestial_coords(
     fov, rotation_matrix, distortion
         ``FOV``, ``rotation_matrix`` and ``distortion`` of a solution.
     """
-    size = (float(height), float(width))
-    camera = Pinhole(size, float(fov), distortion or 0.0, np.asarray(rotation_matrix))
+    camera = Pinhole.of_solution(width, height, fov, rotation_matrix, distortion)
     places = ra_dec_of(camera.directions(np.reshape(image_coords, (-1, 2))))
     return [(ra, dec) for ra, dec in places.tolist()]

@@ -15,6 +15,9 @@ from .._result import Result
 SLACK = 1.05
 """How much wider the field of view is searched than accepted: what is compared has errors, too."""
 
+DISTORTED_PERCENT = 10.0
+"""How much wider it is searched for a lens with distortion."""
+
 
 @dataclass(frozen=True)
 class Question:
@@ -72,10 +75,13 @@ class Question:
             yield {"fov": fov, "effort": "fast"}
             yield {}
             yield {"fov": fov}
-        elif error * SLACK < fov:
-            yield {"fov": fov, "scale_error": 100.0 * SLACK * error / fov}
         else:
-            yield {}
+            percent = 100.0 * SLACK * error / fov
+            if percent < 100.0:
+                yield {"fov": fov, "scale_error": percent}
+            # The search compares scales, which distortion changes across the field.
+            percent += DISTORTED_PERCENT
+            yield {"fov": fov, "scale_error": percent} if percent < 100.0 else {}
 
     def accepts(self, result: Result) -> bool:
         """Whether a solution is within the stated limits."""

@@ -33,6 +33,9 @@ EQUINOX = 2000
 EPOCH = 2000.0
 """Year of the stars' positions: frames have no dates here."""
 
+ROUNDING_PX = 0.01
+"""More than centroids are rounded by in a result."""
+
 VALUES = (
     *("RA", "Dec", "Roll", "FOV", "distortion", "RMSE", "P90E", "MAXE", "Matches", "Prob"),
     *("epoch_equinox", "epoch_proper_motion", "cache_hit_fraction"),
@@ -114,6 +117,21 @@ def _columns(rows: Array, *names: str) -> dict[str, Any]:
     }
 
 
+def _as_given(rounded: Array, given: Array) -> Array:
+    """Return for each centroid that was rounded the one that was given."""
+    given = given[np.isfinite(given).all(axis=1)]
+    given = given[np.argsort(given[:, 0])]
+    # Only neighbors are compared: the distances of all would need gigabytes for long lists.
+    first, end = (
+        np.searchsorted(given[:, 0], rounded[:, 0] + shift) for shift in (-ROUNDING_PX, ROUNDING_PX)
+    )
+    exact = np.empty_like(rounded)
+    for number, place in enumerate(rounded):
+        near = given[first[number] : end[number]]
+        exact[number] = near[np.abs(near - place).sum(axis=1).argmin()]
+    return exact
+
+
 class _Stars:
     """The stars of a result."""
 
@@ -121,8 +139,7 @@ class _Stars:
         columns = result.star_columns
         self.centroids = np.stack([columns["y"], columns["x"]], axis=-1) + 0.5
         if given is not None:
-            apart = np.linalg.norm(self.centroids[:, None] - given, axis=-1)
-            self.centroids = given[apart.argmin(axis=1)]
+            self.centroids = _as_given(self.centroids, given)
         named = columns["id"] != ""
         self._columns = {name: column[named] for name, column in columns.items()}
         self._missed = [
