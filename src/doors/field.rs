@@ -30,17 +30,14 @@ impl Field {
     /// The field of a frame; `None` where it is not identified.
     pub fn new(solution: &Solution) -> Option<Self> {
         let found = solution.outcome.identification()?;
-        let [[xx, xy], [yx, yy]] = wcs::linear(solution)?.cd_deg;
-        let determinant = xx * yy - xy * yx;
-        let parity = if determinant < 0.0 { -1.0 } else { 1.0 };
+        let linear = wcs::linear(solution)?;
+        let [[xx, xy], [yx, yy]] = linear.cd_deg;
+        let parity = if linear.is_mirrored() { 1.0 } else { -1.0 };
         let orientation_rad = -libm::atan2(parity * yx - xy, parity * xx + yy);
-        let scale_deg = determinant.abs().sqrt();
+        let scale_deg = linear.scale_deg();
         let centre = found.camera.centre();
-        let seen = |x: f64, y: f64| {
-            let pixel = PixelPoint::new(centre.x + x, centre.y + y);
-            let apparent = found.apparent_direction_of(&pixel)?;
-            Some(found.places.astrometric(&apparent))
-        };
+        let seen =
+            |x: f64, y: f64| found.direction_of(&PixelPoint::new(centre.x + x, centre.y + y));
         let middle = seen(0.0, 0.0)?;
         let extent_rad = |x: f64, y: f64| {
             let borders = [seen(-x, -y)?, seen(x, y)?];
@@ -65,7 +62,7 @@ impl Field {
             extent_deg,
             pixel_scale_arcsec: scale_deg * 3600.0,
             orientation_deg: orientation_rad * DEG_PER_RAD,
-            is_mirrored: determinant > 0.0,
+            is_mirrored: linear.is_mirrored(),
         })
     }
 

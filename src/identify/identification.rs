@@ -5,6 +5,7 @@ use crate::camera::CameraModel;
 use crate::catalog::StarIndex;
 use crate::ephemeris::places::{AttitudeFrame, StarPlaces};
 use crate::identify::field::SourceIndex;
+use crate::identify::predict::SkyView;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -148,6 +149,21 @@ impl Identification {
     pub fn apparent_direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
         let direction = self.camera.direction_of(pixel)?;
         Some(self.icrs_to_camera.inverse().apply(&direction))
+    }
+
+    /// The catalogue's direction at a pixel; `None` outside the lens's field.
+    pub fn direction_of(&self, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
+        let apparent = self.apparent_direction_of(pixel)?;
+        Some(self.places.astrometric(&apparent))
+    }
+
+    /// What the camera sees of the catalogue.
+    pub fn view(&self) -> SkyView<'_> {
+        SkyView {
+            camera: &self.camera,
+            icrs_to_camera: &self.icrs_to_camera,
+            places: self.places,
+        }
     }
 
     /// The attitude relative to these directions.

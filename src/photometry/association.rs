@@ -255,7 +255,6 @@ mod tests {
         let frame = IdentifiedFrame {
             detections: &detections,
             identification: &identification,
-            places: StarPlaces::default(),
             exposure_s: None,
             vignetting: 0.0,
         };

@@ -3,7 +3,6 @@
 use crate::base::coords::PixelPoint;
 use crate::camera::data_sheet::lens_transmission;
 use crate::detect::Detections;
-use crate::ephemeris::places::StarPlaces;
 use crate::identify::Identification;
 use crate::photometry::comparison::FieldPosition;
 
@@ -14,8 +13,6 @@ pub struct IdentifiedFrame<'a> {
     pub detections: &'a Detections,
     /// Camera, attitude and matches; the matches are indices into the detections.
     pub identification: &'a Identification,
-    /// Where the catalogue's stars appear.
-    pub places: StarPlaces,
     /// Exposure in seconds, where known.
     pub exposure_s: Option<f64>,
     /// Share of the light lost in the corners, as far as it is known.
@@ -47,7 +44,7 @@ impl IdentifiedFrame<'_> {
         let camera = &self.identification.camera;
         let airmass = |pixel: &PixelPoint| {
             let direction = self.identification.apparent_direction_of(pixel)?;
-            self.places.airmass(&direction)
+            self.identification.places.airmass(&direction)
         };
         let central_airmass = airmass(&camera.centre())?;
         let typical_adu = self.detections.flux_limits.typical()?;

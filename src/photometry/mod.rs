@@ -33,7 +33,7 @@ pub use measured::instrumental_mag;
 use crate::base::statistics::median_of;
 use crate::catalog::StarIndex;
 use crate::detect::Detection;
-use crate::identify::{IndexedCatalog, SkyView};
+use crate::identify::IndexedCatalog;
 use association::{Association, FrameStar, associate};
 use completeness::{Completeness, CountedStar, NoLimit};
 pub(crate) use measured::{MAG_PER_RELATIVE, MeasuredMagnitude};
@@ -60,11 +60,7 @@ pub struct FramePhotometry {
 
 /// Measures zero point and completeness of `frame` with the stars of `sky`.
 pub(crate) fn measure(frame: &IdentifiedFrame, sky: &IndexedCatalog) -> FramePhotometry {
-    let view = SkyView {
-        camera: &frame.identification.camera,
-        icrs_to_camera: &frame.identification.icrs_to_camera,
-        places: frame.places,
-    };
+    let view = frame.identification.view();
     let predicted = view.stars_to(sky, depth_v_mag(frame, sky));
     let Association { stars, chance } = associate(frame, &predicted);
     let clear: Vec<&FrameStar> = stars.iter().filter(|star| star.is_clear).collect();

@@ -69,10 +69,7 @@ struct TrailEnd {
 impl TrailEnd {
     fn of(solution: &Solution, pixel: &PixelPoint) -> Self {
         let found = solution.outcome.identification();
-        let direction = found.and_then(|found| {
-            let apparent = found.apparent_direction_of(pixel)?;
-            Some(found.places.astrometric(&apparent))
-        });
+        let direction = found.and_then(|found| found.direction_of(pixel));
         let observed = direction.and_then(|direction| {
             Observation::new(solution.site?, &solution.date?.date, &direction)
         });

@@ -209,8 +209,8 @@ impl SkyLevels {
                 let Some(pixel_sr) = solid_angle_sr(grid, &pixel) else {
                     continue;
                 };
-                let airmass = frame.places.airmass(&direction);
-                let weight = frame.places.zenith().map_or(0.0, |zenith| {
+                let airmass = frame.identification.places.airmass(&direction);
+                let weight = frame.identification.places.zenith().map_or(0.0, |zenith| {
                     meter_weight(zenith.angle_to(&direction) * DEG_PER_RAD)
                 });
                 let place = LightSample {

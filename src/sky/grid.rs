@@ -86,8 +86,8 @@ impl<'a> SkyCellGrid<'a> {
     /// The parts of the sky over `frame`.
     pub(super) fn over(frame: &IdentifiedFrame<'a>) -> Self {
         let found = frame.identification;
-        match HorizonAxes::of(&frame.places).filter(|_| is_wide(&found.camera)) {
-            Some(horizon) => Self::of_horizon(found, horizon, &frame.places),
+        match HorizonAxes::of(&frame.identification.places).filter(|_| is_wide(&found.camera)) {
+            Some(horizon) => Self::of_horizon(found, horizon, &frame.identification.places),
             None => Self::of_frame(found),
         }
     }

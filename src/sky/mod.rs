@@ -50,7 +50,7 @@ pub(crate) use picture::SkyPicture;
 pub use tone_curve::{CurveKind, ToneFit};
 
 use crate::base::statistics::Estimate;
-use crate::identify::{IndexedCatalog, SkyView};
+use crate::identify::IndexedCatalog;
 use crate::photometry::IdentifiedFrame;
 use crate::photometry::association::associate;
 use brightness::SkyLevels;
@@ -117,11 +117,7 @@ pub(crate) fn measure(
     stated: Option<&StatedLimit>,
     usual: Option<&ClearSky>,
 ) -> Option<SkyMap> {
-    let view = SkyView {
-        camera: &frame.identification.camera,
-        icrs_to_camera: &frame.identification.icrs_to_camera,
-        places: frame.places,
-    };
+    let view = frame.identification.view();
     let predicted = view.stars_to(catalog, crate::photometry::depth_v_mag(frame, catalog));
     let association = associate(frame, &predicted);
     let stars = stars::select(frame, &association, &predicted, catalog);

@@ -62,7 +62,7 @@ impl CloudInputs<'_> {
     /// Airmass of the frame's centre, where the horizon is known.
     pub(super) fn center_airmass(&self) -> Option<f64> {
         let center = self.grid.direction_of(&self.grid.camera().centre())?;
-        self.frame.places.airmass(&center)
+        self.frame.identification.places.airmass(&center)
     }
 
     /// The stars in cells whose depth is known.

@@ -54,13 +54,13 @@ pub(super) fn select(
             let measured = clean
                 .filter(|detection| detection.flux_adu > 0.0)
                 .map(|detection| MeasuredMagnitude::of(frame, star, detection));
-            let direction = frame.places.of(known);
+            let direction = frame.identification.places.of(known);
             SkyStar {
                 direction,
                 pixel: predicted.pixel,
                 v_mag: star.v_mag,
                 bv_mag: known.bv_mag.map(f64::from),
-                airmass: frame.places.airmass(&direction),
+                airmass: frame.identification.places.airmass(&direction),
                 off_axis_sq: circle.off_axis_sq(&predicted.pixel),
                 brighter_mag: star.brighter_mag(),
                 is_detected: detection.is_some(),

@@ -2,8 +2,7 @@
 
 use crate::catalog::StarIndex;
 use crate::detect::{Detection, Detections};
-use crate::ephemeris::places::StarPlaces;
-use crate::identify::{Identification, IndexedCatalog, PredictedStar, SkyView};
+use crate::identify::{Identification, IndexedCatalog, PredictedStar};
 use crate::photometry::resolved_px;
 use std::collections::HashSet;
 use std::fmt;
@@ -54,18 +53,13 @@ pub(super) struct NamedFrame<'a> {
     pub detections: &'a Detections,
     pub identification: &'a Identification,
     pub indexed: &'a IndexedCatalog<'a>,
-    pub places: StarPlaces,
 }
 
 impl NamedFrame<'_> {
     /// Bright catalogue stars well inside the frame without a name, brightest first.
     pub(super) fn missing_stars(&self) -> Vec<MissingStar> {
         let found = self.identification;
-        let view = SkyView {
-            camera: &found.camera,
-            icrs_to_camera: &found.icrs_to_camera,
-            places: self.places,
-        };
+        let view = found.view();
         let spot_px = self.detections.spot_sigma_px;
         let border_px = (BORDER_SIGMAS * spot_px).max(BORDER_PX);
         let named: HashSet<StarIndex> = found.matches.iter().map(|m| m.star).collect();

@@ -16,12 +16,9 @@ use crate::base::units::DEG_PER_RAD;
 use crate::calibration::Calibration;
 use crate::detect::{Detections, SkyArea, Trail};
 use crate::ephemeris::observer::Observation;
-use crate::ephemeris::places::StarPlaces;
 use crate::ephemeris::solar_system::moon_and_sun;
 use crate::frame::{DefectiveColumn, Frame};
-use crate::identify::{
-    Identification, PredictedStar, Priors, ScalePrior, SkyRegion, SkyView, SourceIndex,
-};
+use crate::identify::{Identification, PredictedStar, Priors, ScalePrior, SkyRegion, SourceIndex};
 use crate::photometry::comparison::{Comparison, FieldStar, FrameMeasurement, compare};
 use crate::photometry::{self, FramePhotometry, IdentifiedFrame, PictureColors};
 use crate::sky::{self, DarkLevel, DarkSource, SkyMap, SkyPicture, StatedLimit};
@@ -36,8 +33,6 @@ pub(super) struct SolvedFrame<'a> {
     /// What follows from the mosaic of a raw color frame.
     pub mosaic: Option<RawColor>,
     pub priors: Priors,
-    /// Where the catalogue's stars appear.
-    pub places: StarPlaces,
     pub detections: Detections,
     /// The detections as sources.
     pub sources: Vec<Source>,
@@ -151,7 +146,6 @@ impl SolvedFrame<'_> {
         IdentifiedFrame {
             detections: &self.detections,
             identification,
-            places: identification.places,
             exposure_s: self.priors.exposure_s,
             vignetting: self.stated_vignetting(),
         }
@@ -317,7 +311,6 @@ impl SolvedFrame<'_> {
             detections: &self.detections,
             identification,
             indexed: self.context.indexed,
-            places: self.places,
         };
         let sources = self.bodies.iter().filter_map(|body| body.source);
         let known: HashSet<usize> = sources.map(SourceIndex::get).collect();
@@ -334,11 +327,7 @@ impl SolvedFrame<'_> {
 
     /// All catalogue stars in the frame.
     fn field(&self, found: &Identification) -> Vec<FieldStar> {
-        let view = SkyView {
-            camera: &found.camera,
-            icrs_to_camera: &found.icrs_to_camera,
-            places: self.places,
-        };
+        let view = found.view();
         let indexed = self.context.indexed;
         let stars = view.stars_to(indexed, indexed.faintest_v_mag());
         let inside = stars

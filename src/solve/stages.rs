@@ -246,7 +246,6 @@ fn solve(
         observation: observation(&outcome, &priors),
         priors,
         place_time,
-        places,
         trails,
         detections,
         sources,

@@ -2,7 +2,6 @@
 
 use super::plate::Plate;
 use crate::frame::{FitsHeader, RowOrder};
-use crate::identify::SkyView;
 use crate::report::wcs;
 use crate::solve::Solution;
 
@@ -18,12 +17,7 @@ pub fn solved_cards(
     let found = solution.outcome.identification();
     match found.filter(|_| with_distortion) {
         Some(found) => {
-            let view = SkyView {
-                camera: &found.camera,
-                icrs_to_camera: &found.icrs_to_camera,
-                places: found.places,
-            };
-            wcs::add_projection(&mut header, &view, rows);
+            wcs::add_projection(&mut header, &found.view(), rows);
         }
         None => add_plane(&mut header, plate),
     }

@@ -7,7 +7,6 @@
 //! # Reference
 //! K. Miyashita, "Half flux diameter"; <https://en.wikipedia.org/wiki/Half_flux_diameter>.
 
-use super::plate::sky_at;
 use crate::base::coords::PixelPoint;
 use crate::base::statistics::median_of;
 use crate::base::units::DEG_PER_RAD;
@@ -79,7 +78,7 @@ impl StarList {
                 RowOrder::TopDown => y - 1.0,
                 RowOrder::BottomUp => found.camera.height_px - y,
             };
-            let direction = sky_at(found, &PixelPoint::new(x - 1.0, y));
+            let direction = found.direction_of(&PixelPoint::new(x - 1.0, y));
             star.sky_deg = direction.map(|sky| {
                 let (ra_rad, dec_rad) = sky.to_ra_dec();
                 [ra_rad, dec_rad].map(|rad| rad * DEG_PER_RAD)

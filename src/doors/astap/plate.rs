@@ -1,10 +1,9 @@
 //! The linear solution of a frame.
 
-use crate::base::coords::{Icrs, PixelPoint, UnitVector};
+use crate::base::coords::PixelPoint;
 use crate::base::format::printable;
 use crate::base::units::DEG_PER_RAD;
 use crate::frame::RowOrder;
-use crate::identify::Identification;
 use crate::solve::Solution;
 
 /// The linear solution of a frame: the plane that touches the sky at the frame's centre.
@@ -33,22 +32,16 @@ pub fn row_order(head: &[u8], stored: RowOrder) -> RowOrder {
     }
 }
 
-/// The catalogue's direction at a pixel.
-pub(super) fn sky_at(found: &Identification, pixel: &PixelPoint) -> Option<UnitVector<Icrs>> {
-    let apparent = found.apparent_direction_of(pixel)?;
-    Some(found.places.astrometric(&apparent))
-}
-
 impl Plate {
     /// The solution of a frame with its rows in this order; `None` where it is not identified.
     pub fn new(solution: &Solution, rows: RowOrder) -> Option<Self> {
         let found = solution.outcome.identification()?;
         let size_px = [solution.width, solution.height];
         let centre = found.camera.centre();
-        let middle = sky_at(found, &centre)?;
+        let middle = found.direction_of(&centre)?;
         let (east, north) = middle.east_north();
         let on_plane = |x: f64, y: f64| {
-            let seen = sky_at(found, &PixelPoint::new(centre.x + x, centre.y + y))?;
+            let seen = found.direction_of(&PixelPoint::new(centre.x + x, centre.y + y))?;
             let seen = seen.as_vector();
             let depth = seen.dot(middle.as_vector());
             Some([&east, &north].map(|axis| seen.dot(axis) / depth * DEG_PER_RAD))

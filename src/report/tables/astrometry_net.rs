@@ -193,20 +193,19 @@ pub(super) fn matched(report: &FrameReport, solution: &Solution) -> Vec<u8> {
 
 fn match_row(report: &FrameReport, solution: &Solution) -> Option<MatchRow> {
     let found = solution.outcome.identification()?;
-    let [[xx, xy], [yx, yy]] = wcs::linear(solution)?.cd_deg;
-    let determinant = xx * yy - xy * yx;
+    let linear = wcs::linear(solution)?;
     let diagonal_px = libm::hypot(report.width as f64, report.height as f64);
     let stars = found.matches.len() as u64;
     let detections = solution.sources.len() as u64;
     Some(MatchRow {
-        radius: 0.5 * diagonal_px * determinant.abs().sqrt(),
+        radius: 0.5 * diagonal_px * linear.scale_deg(),
         nmatch: stars,
         ndistract: detections.saturating_sub(stars),
         nconflict: 0,
         nfield: detections,
         nindex: stars,
         wcs_valid: true,
-        parity: determinant > 0.0,
+        parity: linear.is_mirrored(),
         logodds: -LN_10 * found.log10_false_alarm,
     })
 }
@@ -224,9 +223,8 @@ fn pairs(report: &FrameReport, solution: &Solution) -> Vec<CorrRow> {
         let predicted = found.pixel_of(&matched.light)?;
         let [field_x, field_y] = report.file_pixel(source);
         let [index_x, index_y] = report.file_pixel(&predicted);
-        let seen = found.apparent_direction_of(source);
-        let seen = seen.map(|apparent| found.places.astrometric(&apparent).to_ra_dec());
-        let (ra_rad, dec_rad) = seen.unzip();
+        let seen = found.direction_of(source);
+        let (ra_rad, dec_rad) = seen.map(|seen| seen.to_ra_dec()).unzip();
         Some(CorrRow {
             field_x,
             field_y,

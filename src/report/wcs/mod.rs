@@ -119,7 +119,7 @@ fn cards(
         return None;
     };
     let mut header = FitsHeader::default();
-    Mapping::new(&view_of(identification), row_order, max_order).add_to(&mut header);
+    Mapping::new(&identification.view(), row_order, max_order).add_to(&mut header);
     add_errors(&mut header, identification);
     if let Some(known) = &solution.date {
         let utc = known.date.to_iso();
@@ -155,15 +155,24 @@ pub struct LinearWcs {
 pub fn linear(solution: &Solution) -> Option<LinearWcs> {
     let found = solution.outcome.identification()?;
     let row_order = solution.row_order.unwrap_or_default();
-    let mapping = Mapping::new(&view_of(found), row_order, sip::MAX_ORDER);
+    let mapping = Mapping::new(&found.view(), row_order, sip::MAX_ORDER);
     Some(mapping.linear)
 }
 
-fn view_of(found: &Identification) -> SkyView<'_> {
-    SkyView {
-        camera: &found.camera,
-        icrs_to_camera: &found.icrs_to_camera,
-        places: found.places,
+impl LinearWcs {
+    /// Pixel scale, in degrees.
+    pub fn scale_deg(&self) -> f64 {
+        self.determinant_deg2().abs().sqrt()
+    }
+
+    /// Whether east and north are seen as in a mirror in the rows of the file.
+    pub fn is_mirrored(&self) -> bool {
+        self.determinant_deg2() > 0.0
+    }
+
+    fn determinant_deg2(&self) -> f64 {
+        let [[xx, xy], [yx, yy]] = self.cd_deg;
+        xx * yy - xy * yx
     }
 }
 

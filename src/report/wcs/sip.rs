@@ -2,7 +2,7 @@
 
 use crate::base::coords::{PixelPoint, UnitVector};
 use crate::camera::CameraModel;
-use nalgebra::{DMatrix, DVector, Matrix2};
+use nalgebra::{DMatrix, Matrix2};
 
 /// Highest order; keywords have one digit per power.
 pub(super) const MAX_ORDER: usize = 9;
@@ -164,10 +164,13 @@ fn fit_best(
     scale_px: f64,
     max_order: usize,
 ) -> Option<[Polynomial; 2]> {
-    let mut best: Option<(f64, [Polynomial; 2])> = None;
     let max_order = max_order.clamp(1, MAX_ORDER);
+    let determined = |order: &usize| powers(*order).count() <= from.len();
+    let max_order = (1..=max_order).rev().find(determined)?;
+    let fits = Fits::new(from, to, scale_px, max_order);
+    let mut best: Option<(f64, [Polynomial; 2])> = None;
     for order in MIN_ORDER.min(max_order)..=max_order {
-        let Some(fitted) = fit(order, from, to, scale_px) else {
+        let Some(fitted) = fits.of_order(order) else {
             break;
         };
         let errors_px = from.iter().zip(to).map(|(from, to)| {
@@ -185,27 +188,51 @@ fn fit_best(
     best.map(|(_, fitted)| fitted)
 }
 
-/// Fits by least squares the polynomials that map `from` to `to`.
-fn fit(order: usize, from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64) -> Option<[Polynomial; 2]> {
-    let terms: Vec<(usize, usize)> = powers(order).collect();
-    if from.len() < terms.len() {
-        return None;
+/// Least-squares fits of the polynomials of all orders to a highest one: columns are sorted by degree, so that a part
+/// of one QR decomposition is the decomposition for each lower order.
+struct Fits {
+    scale_px: f64,
+    triangle: DMatrix<f64>,
+    /// Both axes, turned by the orthogonal factor.
+    wanted: DMatrix<f64>,
+}
+
+impl Fits {
+    fn new(from: &[[f64; 2]], to: &[[f64; 2]], scale_px: f64, max_order: usize) -> Self {
+        let mut terms: Vec<(usize, usize)> = powers(max_order).collect();
+        terms.sort_by_key(|term| column(*term));
+        // In units of the scale, so that high powers stay of order one.
+        let design = DMatrix::from_fn(from.len(), terms.len(), |row, column| {
+            let ([u, v], (p, q)) = (from[row], terms[column]);
+            (u / scale_px).powi(p as i32) * (v / scale_px).powi(q as i32)
+        });
+        let mut wanted = DMatrix::from_fn(to.len(), 2, |row, axis| to[row][axis]);
+        let decomposed = design.qr();
+        decomposed.q_tr_mul(&mut wanted);
+        Self {
+            scale_px,
+            triangle: decomposed.unpack_r(),
+            wanted,
+        }
     }
-    // In units of the scale, so that high powers stay of order one.
-    let design = DMatrix::from_fn(from.len(), terms.len(), |row, column| {
-        let ([u, v], (p, q)) = (from[row], terms[column]);
-        (u / scale_px).powi(p as i32) * (v / scale_px).powi(q as i32)
-    });
-    let decomposed = design.svd(true, true);
-    let solve = |axis: usize| {
-        let wanted = DVector::from_iterator(to.len(), to.iter().map(|to| to[axis]));
-        let solved = decomposed.solve(&wanted, 1e-12).ok()?;
-        let coefficient =
-            |(value, (p, q)): (&f64, &(usize, usize))| value / scale_px.powi((p + q) as i32);
-        Some(Polynomial {
+
+    /// The fit of this order; `None` where the points do not determine it.
+    fn of_order(&self, order: usize) -> Option<[Polynomial; 2]> {
+        let count = powers(order).count();
+        let triangle = self.triangle.view((0, 0), (count, count));
+        let solved = triangle.solve_upper_triangular(&self.wanted.rows(0, count))?;
+        let coefficient = |(p, q): (usize, usize), axis: usize| {
+            solved[(column((p, q)), axis)] / self.scale_px.powi((p + q) as i32)
+        };
+        Some([0, 1].map(|axis| Polynomial {
             order,
-            coefficients: solved.iter().zip(&terms).map(coefficient).collect(),
-        })
-    };
-    Some([solve(0)?, solve(1)?])
+            coefficients: powers(order).map(|term| coefficient(term, axis)).collect(),
+        }))
+    }
+}
+
+/// Where a term is among all, sorted by their degrees.
+fn column((p, q): (usize, usize)) -> usize {
+    let degree = p + q;
+    degree * (degree + 1) / 2 - 1 + p
 }

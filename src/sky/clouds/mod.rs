@@ -205,7 +205,10 @@ impl CloudInputs<'_> {
     ) -> Option<LitCell> {
         let place = self.grid.pixel_of(likelihoods.cell)?;
         let direction = self.grid.direction_of(&place)?;
-        let (camera, zenith) = (self.grid.camera(), self.frame.places.zenith());
+        let (camera, zenith) = (
+            self.grid.camera(),
+            self.frame.identification.places.zenith(),
+        );
         Some(LitCell {
             cell: likelihoods.cell,
             hidden,

@@ -116,10 +116,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
-    (
-        "doors",
-        &["base", "centroids", "frame", "identify", "report", "solve"],
-    ),
+    ("doors", &["base", "centroids", "frame", "report", "solve"]),
     (
         "night",
         &[
