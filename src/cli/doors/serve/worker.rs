@@ -162,6 +162,7 @@ impl Solver<'_> {
         let name = Path::new(&input.name);
         solve_guarded(name, workspace, |workspace| {
             if let Some(list) = upload.and_then(|upload| upload.list(content)) {
+                let list = list.context("reading the list of stars")?;
                 let solution = solve_centroids(&list, &context, workspace)
                     .context("reading the list of stars")?;
                 return Ok(SolvedImage {
