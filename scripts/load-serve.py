@@ -117,7 +117,7 @@ class Load:
         return socket.create_connection(("127.0.0.1", self.server.port), timeout=60)
 
     def head(self, length):
-        return f"POST /api/upload HTTP/1.1\r\nHost: a\r\nContent-Length: {length}\r\n\r\n".encode()
+        return f"POST /api/upload HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n".encode()
 
     def slow(self):
         with self.connect() as stream:
@@ -140,7 +140,7 @@ class Load:
     def huge(self):
         """A body of 1 GB without a length, sent as long as the server takes it."""
         with self.connect() as stream:
-            stream.sendall(b"POST /solve HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n")
+            stream.sendall(b"POST /solve HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n")
             chunk = b"100000\r\n" + bytes(0x100000) + b"\r\n"
             for _ in range(1000):
                 stream.sendall(chunk)

@@ -40,13 +40,28 @@ impl XylistOptions {
     }
 
     /// The list in the bytes of a file that has one and no picture.
-    pub fn read_bytes(&self, file: &[u8]) -> Option<CentroidList> {
+    ///
+    /// # Errors
+    /// It has more than `max_rows` rows.
+    pub fn read_bytes(
+        &self,
+        file: &[u8],
+        max_rows: usize,
+    ) -> Option<Result<CentroidList, CentroidListError>> {
         /// The first header ends before.
         const MAX_HEADER_BYTES: usize = 36 * 2880;
         let head = &file[..file.len().min(MAX_HEADER_BYTES)];
         memmem::find(head, b"XTENSION= 'BINTABLE")?;
-        let list = self.first_list(&FileRanges::of_bytes(file.to_vec()));
-        list.ok()?.filter(|list| !list.centroids.is_empty())
+        let file = FileRanges::of_bytes(file.to_vec());
+        let (_, tables) = read_tables(&file).ok()?;
+        let table = tables.iter().find(|table| self.position(table).is_some())?;
+        let count = table.rows.count;
+        if count > max_rows as u64 {
+            let message = format!("found {count} rows, expected at most {max_rows}");
+            return Some(Err(CentroidListError::of_list(message)));
+        }
+        let list = self.first_list(&file).ok()??;
+        (!list.centroids.is_empty()).then_some(Ok(list))
     }
 
     /// Reads the first list in a file.
@@ -186,6 +201,15 @@ mod tests {
         assert_eq!(list.centroids[0].position, PixelPoint::new(0.0, 1.5));
         // Without a column of brightness the first is the brightest.
         assert!(!list.has_brightness && list.centroids[0].mag < list.centroids[1].mag);
+    }
+
+    #[test]
+    fn a_list_that_is_too_long_is_refused() {
+        let bytes = std::fs::read(file(&[(9.0, 1.0, 2.5), (7.0, 11.0, 12.0)])).unwrap();
+        let read = |max_rows| XylistOptions::default().read_bytes(&bytes, max_rows);
+        assert_eq!(read(2).unwrap().unwrap().centroids.len(), 2);
+        let refused = read(1).unwrap().unwrap_err().to_string();
+        assert!(refused.contains("2 rows, expected at most 1"), "{refused}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The settings of an upload: hints, or a list of stars in place of a picture.
 
 use crate::base::coords::PixelPoint;
-use crate::centroids::{CentroidList, ListedCentroid, XylistOptions};
+use crate::centroids::{CentroidList, CentroidListError, ListedCentroid, XylistOptions};
 use crate::doors::scale::{ScaleRange, ScaleUnit};
 use crate::identify::Photometry;
 use crate::solve::SolveOptions;
@@ -9,6 +9,9 @@ use serde_json::{Map, Value};
 
 /// Tolerance of an estimated scale without an error, in percent.
 const SCALE_ERR: f64 = 10.0;
+
+/// More rows of a list are refused: they would take too much memory.
+const MAX_ROWS: usize = 100_000;
 
 /// Why a setting cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -74,11 +77,19 @@ impl Upload {
     }
 
     /// The list of stars: its own, or the one in `file`, where that is a table of FITS with places.
-    pub fn list(&self, file: &[u8]) -> Option<CentroidList> {
-        let mut list = match &self.places {
-            Some(places) => Self::stated_list(places),
-            None => XylistOptions::default().read_bytes(file)?,
+    ///
+    /// # Errors
+    /// The table is too long.
+    pub fn list(&self, file: &[u8]) -> Option<Result<CentroidList, CentroidListError>> {
+        let list = match &self.places {
+            Some(places) => Ok(Self::stated_list(places)),
+            None => XylistOptions::default().read_bytes(file, MAX_ROWS)?,
         };
+        Some(list.map(|list| self.completed(list)))
+    }
+
+    /// A list with what is stated beside it.
+    fn completed(&self, mut list: CentroidList) -> CentroidList {
         for (stated, side) in self
             .sides
             .into_iter()
@@ -89,7 +100,7 @@ impl Upload {
         for centroid in &mut list.centroids {
             centroid.sigma_px = self.error_px;
         }
-        Some(list)
+        list
     }
 
     fn stated_list(places: &[[f64; 2]]) -> CentroidList {
@@ -184,6 +195,9 @@ impl Settings<'_> {
         if x.len() != y.len() {
             return Err(refused("y", "as long as \"x\""));
         }
+        if x.len() > MAX_ROWS {
+            return Err(refused("x", "a list of at most 100000 numbers"));
+        }
         Ok(Some(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect()))
     }
 }
@@ -254,7 +268,7 @@ mod tests {
     fn lists_count_from_one() {
         let settings =
             json!({"x": [1, "2.5"], "y": [10.0, 1], "image_width": 20, "image_height": 30});
-        let list = upload(settings).unwrap().list(b"").unwrap();
+        let list = upload(settings).unwrap().list(b"").unwrap().unwrap();
         assert_eq!([list.width, list.height], [Some(20), Some(30)]);
         let places: Vec<_> = list.centroids.iter().map(|star| star.position).collect();
         assert_eq!(
@@ -262,7 +276,7 @@ mod tests {
             [PixelPoint::new(0.0, 9.0), PixelPoint::new(1.5, 0.0)]
         );
         assert!(list.centroids[0].mag < list.centroids[1].mag);
-        assert_eq!(Upload::default().list(b"SIMPLE"), None);
+        assert!(Upload::default().list(b"SIMPLE").is_none());
     }
 
     #[test]
@@ -281,6 +295,10 @@ mod tests {
                 "\"y\" must be as long as \"x\"",
             ),
             (json!({"x": 1, "y": [1]}), "\"x\" must be a list of numbers"),
+            (
+                json!({"x": vec![1; MAX_ROWS + 1], "y": vec![1; MAX_ROWS + 1]}),
+                "\"x\" must be a list of at most 100000 numbers",
+            ),
             (
                 json!({"image_width": 2.5}),
                 "\"image_width\" must be a number of pixels",

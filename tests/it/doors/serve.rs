@@ -6,7 +6,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -33,16 +33,27 @@ impl Reply {
 }
 
 impl Server {
-    fn start(folder: &Path, options: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_starpipe"))
+    fn command(folder: &Path, options: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_starpipe"));
+        command
             .env("STARPIPE_CACHE_DIR", cache_dir())
             .env("STARPIPE_CATALOGS", "")
             .args(["serve", "--listen", "127.0.0.1:0", "--folder"])
             .arg(folder)
             .args(options)
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+            .stderr(Stdio::piped());
+        command
+    }
+
+    fn start(folder: &Path, options: &[&str]) -> Self {
+        let (server, mut log) = Self::start_with_log(folder, options);
+        // Somebody must read the log.
+        thread::spawn(move || log.read_to_end(&mut Vec::new()));
+        server
+    }
+
+    fn start_with_log(folder: &Path, options: &[&str]) -> (Self, BufReader<ChildStderr>) {
+        let mut process = Self::command(folder, options).spawn().unwrap();
         let mut log = BufReader::new(process.stderr.take().unwrap());
         let mut told = String::new();
         let address = loop {
@@ -52,9 +63,7 @@ impl Server {
                 break address.trim().to_owned();
             }
         };
-        // Somebody must read the log.
-        thread::spawn(move || log.read_to_end(&mut Vec::new()));
-        Self { process, address }
+        (Self { process, address }, log)
     }
 
     fn connect(&self) -> TcpStream {
@@ -71,13 +80,16 @@ impl Server {
     }
 
     fn get(&self, path: &str) -> Reply {
-        self.send(format!("GET {path} HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n").as_bytes())
+        self.send(
+            format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                .as_bytes(),
+        )
     }
 
     fn post(&self, path: &str, head: &str, body: &[u8]) -> Reply {
         let length = body.len();
         let head = format!(
-            "POST {path} HTTP/1.1\r\nHost: a\r\nConnection: close\r\nContent-Length: {length}\r\n{head}\r\n\r\n"
+            "POST {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {length}\r\n{head}\r\n\r\n"
         );
         self.send(&[head.as_bytes(), body].concat())
     }
@@ -117,6 +129,11 @@ impl Server {
             thread::sleep(Duration::from_millis(50));
         }
         id
+    }
+
+    /// The number of a job that was in the folder before the server was started, once it is done.
+    fn done_of_folder(&self, id: u64) -> u64 {
+        self.done(&json!({"status": "success", "subid": id}))
     }
 
     fn info(&self, id: u64) -> Value {
@@ -332,6 +349,11 @@ fn solve_answers_with_other_results_of_process() {
     assert_ne!(plain.body, drawn.body);
     let html = server.solve("?name=orion.png&answer=html", &orion());
     assert!(html.head.contains("content-type: text/html"));
+    assert!(
+        html.head.contains("policy: sandbox allow-scripts; default"),
+        "{}",
+        html.head
+    );
     let view = server.solve("?name=orion.png&answer=view&page=1", &orion());
     let view = view.json();
     let shown: Value = serde_json::from_str(view["json"].as_str().unwrap()).unwrap();
@@ -391,7 +413,10 @@ fn lists_of_stars_are_solved() {
     let sides = json!({"image_width": report["width"], "image_height": report["height"]});
     let id = server.done(&server.upload("a.axy", &table, &sides).json());
     near(&server.info(id)["calibration"]["ra"], 83.7, 0.01);
-    assert_eq!(server.get(&format!("/annotated_display/{id}")).status, 422);
+    // A list has no picture, and nobody is asked again.
+    for path in ["annotated_display", "extraction_image_display"] {
+        assert_eq!(server.get(&format!("/{path}/{id}")).status, 404, "{path}");
+    }
     settings["y"] = json!([1.0]);
     let refused = server.call("upload", &settings);
     assert!(
@@ -434,7 +459,7 @@ fn bodies_are_limited_in_length_and_in_time() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &["--max-upload", "1", "--send-time", "1"]);
     let head = |more: &str| {
-        format!("POST /solve HTTP/1.1\r\nHost: a\r\nConnection: close\r\n{more}\r\n\r\n")
+        format!("POST /solve HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{more}\r\n\r\n")
     };
     // A length that is only claimed, and one that is not.
     let claimed = server.send(head("Content-Length: 1000000000").as_bytes());
@@ -464,6 +489,157 @@ fn bodies_are_limited_in_length_and_in_time() {
     stream.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
     let _ = stream.read_to_end(&mut Vec::new());
     assert!(begun.elapsed() < Duration::from_secs(20));
+    assert_eq!(server.solve("", &orion()).status, 200);
+}
+
+#[test]
+fn the_json_of_calls_is_limited() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[]);
+    let kind = "Content-Type: application/x-www-form-urlencoded";
+    let call = |name: &str, bytes: usize| {
+        let body = format!("request-json={}", "[".repeat(bytes));
+        server.post(&format!("/api/{name}"), kind, body.as_bytes())
+    };
+    for name in ["login", "myjobs", "submission_images"] {
+        let refused = call(name, 100_000);
+        assert_eq!(refused.status, 413, "{name}");
+        let message = refused.json()["errormessage"].clone();
+        assert_eq!(message, "the body is too large: at most 64 kB are accepted");
+    }
+    // A length that is only claimed, of what is no file.
+    let head = "POST /api/upload HTTP/1.1\r\nHost: localhost\r\nContent-Length: 20000000\r\n\r\n";
+    assert_eq!(server.send(head.as_bytes()).status, 413);
+    for (bytes, status) in [(5_000_000, 413), (100_000, 200)] {
+        assert_eq!(call("upload", bytes).status, status, "{bytes}");
+        assert_eq!(call("url_upload", bytes).status, status, "{bytes}");
+    }
+    let long = vec![1; 100_001];
+    let refused = server.call("upload", &json!({"session": "a", "x": long, "y": long}));
+    let message = refused["errormessage"].as_str().unwrap();
+    assert!(message.contains("at most 100000"), "{message}");
+}
+
+#[test]
+fn who_is_refused_early_reads_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys = folder.path().join("keys");
+    fs::write(&keys, "alpha\n").unwrap();
+    let server = Server::start(
+        &folder.path().join("jobs"),
+        &["--keys", keys.to_str().unwrap()],
+    );
+    let head = "POST /solve HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: 7000000\r\n\r\n";
+    let mut stream = server.connect();
+    stream.write_all(head.as_bytes()).unwrap();
+    for _ in 0..7 {
+        thread::sleep(Duration::from_millis(20));
+        stream.write_all(&[0; 1_000_000]).unwrap();
+    }
+    assert_eq!(reply(stream).status, 401);
+}
+
+#[test]
+fn pages_of_other_sites_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &["--host", "proxy.example"]);
+    let ask = |host: &str, more: &str| {
+        let request =
+            format!("POST /solve HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n{more}\r\n");
+        server.send(request.as_bytes())
+    };
+    // A name that was given the address of this computer.
+    let refused = ask("evil.example", "");
+    assert_eq!(refused.status, 421);
+    let message = refused.json()["error"].to_string();
+    assert!(message.contains("--host"), "{message}");
+    let address = &*server.address;
+    let own = &*format!("http://{address}");
+    for (host, origin, status) in [
+        (address, "http://evil.example", 403),
+        (address, "null", 403),
+        (address, own, 415),
+        ("proxy.example", "https://proxy.example", 415),
+        ("nova.astrometry.net", "", 415),
+    ] {
+        let origin = match origin {
+            "" => String::new(),
+            origin => format!("Origin: {origin}\r\n"),
+        };
+        assert_eq!(ask(host, &origin).status, status, "{host} {origin}");
+    }
+}
+
+#[test]
+fn a_folder_of_something_else_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("2023")).unwrap();
+    let refused = Server::command(folder.path(), &[]).output().unwrap();
+    let told = String::from_utf8(refused.stderr).unwrap();
+    assert!(told.contains("no folder of jobs"), "{told}");
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(folder.path().join("2023").exists());
+}
+
+#[test]
+fn jobs_that_cannot_be_done_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("lock"), "").unwrap();
+    let job = json!({"name": "a.png", "settings": {}, "received": ""}).to_string();
+    // One that ended the server twice, one without its upload, one that ended it once.
+    for number in ["1", "2", "3"] {
+        let path = folder.path().join(number);
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join("upload"), orion()).unwrap();
+        fs::write(path.join("job.json"), &job).unwrap();
+    }
+    fs::write(folder.path().join("1/begun"), "11").unwrap();
+    fs::remove_file(folder.path().join("2/upload")).unwrap();
+    fs::write(folder.path().join("3/begun"), "1").unwrap();
+    let server = Server::start(folder.path(), &["--jobs", "1"]);
+    for (number, status, reason) in [
+        (1, "failure", "the server ended while it solved this".into()),
+        (2, "failure", "the server could not read the upload".into()),
+        (3, "success", Value::Null),
+    ] {
+        let info = server.info(server.done_of_folder(number));
+        assert_eq!(
+            (&info["status"], &info["reason"]),
+            (&json!(status), &reason)
+        );
+        assert!(!folder.path().join(format!("{number}/begun")).exists());
+    }
+    for path in ["annotated_display", "new_fits_file"] {
+        assert_eq!(server.get(&format!("/{path}/1")).status, 404, "{path}");
+    }
+}
+
+#[test]
+fn what_is_not_identified_has_pictures_and_no_copy_with_coordinates() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[]);
+    let pgm = [b"P5 64 64 255\n".to_vec(), vec![9; 64 * 64]].concat();
+    let id = server.done(&server.upload("a.pgm", &pgm, &json!({})).json());
+    for (path, status) in [
+        ("new_fits_file", 404),
+        ("wcs_file", 404),
+        ("annotated_display", 200),
+    ] {
+        assert_eq!(
+            server.get(&format!("/{path}/{id}")).status,
+            status,
+            "{path}"
+        );
+    }
+}
+
+#[test]
+fn a_log_that_nobody_reads_costs_no_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let (server, log) = Server::start_with_log(folder.path(), &[]);
+    drop(log);
+    let id = server.done(&server.upload("a.png", &orion(), &json!({})).json());
+    assert_eq!(server.info(id)["status"], "success");
     assert_eq!(server.solve("", &orion()).status, 200);
 }
 
@@ -563,9 +739,9 @@ fn what_was_uploaded_is_solved_after_a_kill() {
     assert_eq!(jobs["jobs"].as_array().unwrap().len(), 5);
 }
 
-#[test]
+/// Sends so many signals while a frame is solved; the exit status, and the answer for the frame.
 #[cfg(unix)]
-fn a_signal_ends_it_when_running_frames_are_done() {
+fn signalled(signals: usize) -> (Option<i32>, u16) {
     let folder = tempfile::tempdir().unwrap();
     let mut server = Server::start(folder.path(), &["--jobs", "1"]);
     let address = server.address.clone();
@@ -574,7 +750,7 @@ fn a_signal_ends_it_when_running_frames_are_done() {
         let file = orion();
         let length = file.len();
         let head = format!(
-            "POST /solve HTTP/1.1\r\nHost: a\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
+            "POST /solve HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
         );
         stream
             .write_all(&[head.as_bytes(), &file].concat())
@@ -585,9 +761,26 @@ fn a_signal_ends_it_when_running_frames_are_done() {
         assert!(!asked.is_finished(), "too fast to be seen");
     }
     let id = server.process.id().to_string();
-    assert!(Command::new("kill").arg(&id).status().unwrap().success());
-    assert_eq!(server.process.wait().unwrap().code(), Some(0));
-    assert_eq!(asked.join().unwrap(), 200);
+    for _ in 0..signals {
+        // The last may come too late.
+        let _ = Command::new("kill").arg(&id).status().unwrap();
+        thread::sleep(Duration::from_millis(20));
+    }
+    (server.process.wait().unwrap().code(), asked.join().unwrap())
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_it_when_running_frames_are_done() {
+    assert_eq!(signalled(1), (Some(0), 200));
+}
+
+#[test]
+#[cfg(unix)]
+fn what_a_second_signal_ends_is_answered() {
+    let (exit, status) = signalled(2);
+    assert_eq!(exit, Some(0));
+    assert!([200, 503].contains(&status), "{status}");
 }
 
 #[test]

@@ -18,16 +18,22 @@ use std::path::PathBuf;
     Programs for nova.astrometry.net work with the address http://127.0.0.1:8080 in place of\n\
     http://nova.astrometry.net, and with any key. docs/doors/serve.md shows how to set it.")]
 pub(crate) struct ServeArgs {
-    /// Address and port to listen on. Other computers are answered only if it is not one of this computer
+    /// Address and port to listen on. With an address of this computer alone (127.0.0.1), other computers
+    /// are not answered
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080")]
     pub(super) listen: SocketAddr,
+    /// Name by which the server may be called, beside addresses and localhost; may be given several times.
+    /// It is needed behind a proxy that passes on its own name
+    #[arg(long, value_name = "NAME")]
+    pub(super) host: Vec<String>,
     /// File with the keys that are accepted, one in each line [default: any key is accepted]
     #[arg(long, value_name = "FILE")]
     pub(super) keys: Option<PathBuf>,
     /// Directory with a page to show at / in place of the built-in form, such as web/dist
     #[arg(long, value_name = "DIR")]
     pub(super) page: Option<PathBuf>,
-    /// Directory in which uploads and their results are kept [default: the user's cache directory]
+    /// Directory in which uploads and their results are kept: new, empty, or one of an earlier start
+    /// [default: the user's cache directory]
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
     /// How much is kept there, in MB; then the oldest results are removed
@@ -42,7 +48,8 @@ pub(crate) struct ServeArgs {
     /// Frames that may wait; others are refused
     #[arg(long, value_name = "NUMBER", default_value_t = 64, value_parser = small_number)]
     pub(super) queue: usize,
-    /// Time in which the head of a request must arrive, and its body beside its length at 50 kB/s
+    /// Time in which the head of a request must arrive, and its body beside its length at 50 kB/s. A client
+    /// that reads nothing of its answer for so long is given up
     #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub(super) send_time: u64,
     /// Also fetch pictures by their address, from public addresses alone (http)

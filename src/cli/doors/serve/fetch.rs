@@ -6,10 +6,10 @@
 //! # Reference
 //! IANA registries of special-purpose addresses (RFC 6890, 2013).
 
-use super::body::{Limits, Received, receive};
+use super::body::{Limits, receive};
 use super::refusal::{NovaRefusal, Refusal};
-use axum::body::Body;
-use axum::http::{Request, Response, Uri, header};
+use axum::body::{Body, Bytes};
+use axum::http::{Request, Response, StatusCode, Uri, header};
 use hyper::body::Incoming;
 use hyper::client::conn::http1;
 use hyper_util::rt::TokioIo;
@@ -26,14 +26,15 @@ const STEP: Duration = Duration::from_secs(10);
 ///
 /// # Errors
 /// If the address is not public, or gives no picture in time.
-pub(super) async fn fetch(limits: &Limits, url: &str) -> Result<Received, NovaRefusal> {
+pub(super) async fn fetch(limits: &Limits, url: &str) -> Result<Bytes, NovaRefusal> {
     let mut target = Target::parse(url)?;
     for _ in 0..=MAX_REDIRECTIONS {
         let response = timeout(STEP, target.get()).await;
         let response = response.map_err(|_| refused("the address does not answer in time"))??;
         let status = response.status();
         if status.is_success() {
-            return Ok(receive(limits, response.into_body()).await?);
+            let received = receive(limits, response.into_body(), limits.max_bytes).await;
+            return received.map_err(of_host);
         }
         if !status.is_redirection() {
             return Err(refused(&format!(
@@ -47,7 +48,15 @@ pub(super) async fn fetch(limits: &Limits, url: &str) -> Result<Received, NovaRe
 }
 
 fn refused(message: &str) -> NovaRefusal {
-    NovaRefusal(Refusal::new(axum::http::StatusCode::OK, message))
+    NovaRefusal::of_call(message)
+}
+
+/// What the host of the address did is no error of the client's request.
+fn of_host(refusal: Refusal) -> NovaRefusal {
+    match refusal.status {
+        StatusCode::SERVICE_UNAVAILABLE => refusal.into(),
+        _ => refused(&format!("fetching the address: {}", refusal.message)),
+    }
 }
 
 /// Where a picture is.
@@ -203,6 +212,19 @@ mod tests {
         ] {
             assert!(is_public(address.parse().unwrap()), "{address}");
         }
+    }
+
+    #[test]
+    fn a_slow_host_is_an_error_of_the_protocol_and_a_full_server_is_not() {
+        let slow = Refusal::new(StatusCode::REQUEST_TIMEOUT, "the body arrives too slowly");
+        let NovaRefusal(told) = of_host(slow);
+        assert_eq!(told.status, StatusCode::OK);
+        assert_eq!(
+            told.message,
+            "fetching the address: the body arrives too slowly"
+        );
+        let NovaRefusal(told) = of_host(Refusal::busy("full"));
+        assert_eq!(told.status, StatusCode::SERVICE_UNAVAILABLE);
     }
 
     #[test]

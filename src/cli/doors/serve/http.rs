@@ -6,10 +6,10 @@ use axum::response::{IntoResponse, Response};
 use serde_json::Value;
 use starpipe::base::format::printable;
 
-/// JSON, as nova.astrometry.net calls it; its clients ask for that.
-pub(super) const NOVA_JSON: &str = "text/plain; charset=utf-8";
 pub(super) const JSON: &str = "application/json";
+/// So nova.astrometry.net calls its JSON, too; its clients ask for that.
 pub(super) const TEXT: &str = "text/plain; charset=utf-8";
+pub(super) const FITS: &str = "application/fits";
 pub(super) const HTML: &str = "text/html; charset=utf-8";
 
 /// A reply of this kind.
@@ -19,7 +19,7 @@ pub(super) fn reply(kind: &'static str, content: impl Into<Body>) -> Response {
 
 /// A reply of the protocol of nova.astrometry.net.
 pub(super) fn nova_reply(answer: &Value) -> Response {
-    reply(NOVA_JSON, answer.to_string())
+    reply(TEXT, answer.to_string())
 }
 
 /// A header as text; empty where it is absent.

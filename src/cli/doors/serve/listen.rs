@@ -2,25 +2,30 @@
 
 use super::routes;
 use super::server::Server;
+use super::solve::MAX_WAIT;
+use super::stream::Stream;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use std::io;
 use std::net::TcpListener;
+use std::pin::pin;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::net::{TcpListener as TokioListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// Connections at once; others wait to be accepted.
 const MAX_CONNECTIONS: usize = 512;
-/// A connection is closed after this time, however slowly its client reads.
-const LIFE: Duration = Duration::from_secs(1800);
 /// Bytes of the head of a request.
 const MAX_HEAD_BYTES: usize = 64 * 1024;
 /// After an error of the system, such as too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
+/// At the end, for the answers of what was aborted.
+const LAST: Duration = Duration::from_secs(1);
+/// Reads and writes of files at once.
+const MAX_FILES: usize = 64;
 
 /// A server that listens.
 pub(super) struct Listening {
@@ -37,6 +42,7 @@ impl Listening {
     pub(super) fn run(self) -> io::Result<()> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
+            .max_blocking_threads(MAX_FILES)
             .build()?;
         let done = runtime.block_on(self.answer());
         // Fetches and reads that hang end with the process.
@@ -51,6 +57,7 @@ impl Listening {
         let router = routes::router(Arc::clone(&server));
         let graceful = GracefulShutdown::new();
         let places = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+        let life = server.limits.life();
         let mut http = http1::Builder::new();
         http.timer(TokioTimer::new())
             .header_read_timeout(server.limits.send_time)
@@ -62,35 +69,44 @@ impl Listening {
                 () = signals.next() => break,
             };
             let service = TowerToHyperService::new(router.clone());
-            let connection = http.serve_connection(TokioIo::new(stream), service);
+            let stream = TokioIo::new(Stream::new(stream, server.limits.send_time));
+            let connection = http.serve_connection(stream, service);
             let connection = graceful.watch(connection);
             tokio::spawn(async move {
                 // What goes wrong on a connection concerns its client alone.
-                let _ = tokio::time::timeout(LIFE, connection).await;
+                let _ = tokio::time::timeout(life, connection).await;
                 drop(place);
             });
         }
         drop(listener);
         tracing::info!("ending: running frames are finished");
         server.queue.close();
-        let most_s = server.options.time_limit_s.unwrap_or(f64::MAX);
-        let most = Duration::try_from_secs_f64(most_s)
-            .unwrap_or(LIFE)
-            .min(LIFE)
-            + server.limits.send_time;
-        tokio::select! {
-            () = graceful.shutdown() => {}
-            () = tokio::time::sleep(most) => {}
-            () = signals.next() => server.abort(),
+        end(&server, graceful, signals).await;
+        Ok(())
+    }
+}
+
+/// Waits until all requests are answered, and no worker runs: it may run a job that nobody waits for.
+async fn end(server: &Server, graceful: GracefulShutdown, mut signals: Signals) {
+    let most_s = server.options.time_limit_s.unwrap_or(f64::MAX);
+    let most = Duration::try_from_secs_f64(most_s).unwrap_or(MAX_WAIT);
+    let mut end = Instant::now() + most.min(MAX_WAIT) + server.limits.send_time;
+    let mut answered = pin!(graceful.shutdown());
+    let mut is_answered = false;
+    loop {
+        if server.queue.running() > 0 {
+            end = end.max(Instant::now() + LAST);
+        } else if is_answered || Instant::now() >= end {
+            return;
         }
-        // Workers may still run jobs that nobody waits for.
-        while server.metrics.running() > 0 {
-            tokio::select! {
-                () = tokio::time::sleep(PAUSE) => {}
-                () = signals.next() => server.abort(),
+        tokio::select! {
+            () = &mut answered, if !is_answered => is_answered = true,
+            () = tokio::time::sleep(PAUSE) => {}
+            () = signals.next() => {
+                server.abort();
+                end = Instant::now() + LAST;
             }
         }
-        Ok(())
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is made of a solved frame.
 
-use super::http::{HTML, JSON};
+use super::http::{FITS, HTML, JSON};
 use super::work::{Input, Wanted};
 use crate::cli::solving::SolvedImage;
 use anyhow::anyhow;
@@ -38,7 +38,7 @@ impl Wanted {
             Self::Report | Self::View => JSON,
             Self::Html => HTML,
             Self::Csv => "text/csv; charset=utf-8",
-            Self::Wcs | Self::SolvedCopy => "application/fits",
+            Self::Wcs | Self::SolvedCopy => FITS,
             Self::Annotated => "image/jpeg",
             Self::Picture(..) | Self::Detections => "image/png",
         }
@@ -98,7 +98,7 @@ pub(super) fn made(
         let copy = wcs::solved_copy(&input.name, frame, solution, RowOrder::TopDown)?;
         return copy.ok_or_else(not_identified);
     }
-    let colors = Colors::decode(&input.content.bytes, frame, buffers);
+    let colors = Colors::decode(&input.content, frame, buffers);
     let mut shown = Shown::new(&input.name, frame);
     shown.colors = colors.as_ref();
     let options = overlay_options(wanted);

@@ -28,7 +28,6 @@ impl Ending {
 /// Counters since the start.
 pub(super) struct Metrics {
     workers: usize,
-    running: AtomicU64,
     endings: [AtomicU64; 3],
     classes: [AtomicU64; CLASSES_S.len()],
     spent_ms: AtomicU64,
@@ -40,7 +39,6 @@ impl Metrics {
     pub(super) fn new(workers: usize) -> Self {
         Self {
             workers,
-            running: AtomicU64::default(),
             endings: Default::default(),
             classes: Default::default(),
             spent_ms: AtomicU64::default(),
@@ -48,12 +46,7 @@ impl Metrics {
         }
     }
 
-    pub(super) fn begin(&self) {
-        self.running.fetch_add(1, Ordering::Relaxed);
-    }
-
     pub(super) fn end(&self, ending: Ending, spent: Duration) {
-        self.running.fetch_sub(1, Ordering::Relaxed);
         self.endings[ending as usize].fetch_add(1, Ordering::Relaxed);
         let spent_ms = u64::try_from(spent.as_millis()).unwrap_or(u64::MAX);
         self.spent_ms.fetch_add(spent_ms, Ordering::Relaxed);
@@ -63,19 +56,14 @@ impl Metrics {
         }
     }
 
-    /// How many frames are being solved.
-    pub(super) fn running(&self) -> u64 {
-        self.running.load(Ordering::Relaxed)
-    }
-
     pub(super) fn count_request(&self, status: u16) {
         if let Some(counter) = self.requests.get(usize::from(status / 100)) {
             counter.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// The counters as text, with how many frames wait, and how much of jobs is kept.
-    pub(super) fn text(&self, waiting: usize, kept_bytes: u64) -> String {
+    /// The counters as text, with how many frames wait and run, and how much of jobs is kept.
+    pub(super) fn text(&self, waiting: usize, running: usize, kept_bytes: u64) -> String {
         let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let mut text = String::new();
         let mut add = |name: &str, kind: &str, help: &str, values: &[(String, String)]| {
@@ -115,7 +103,7 @@ impl Metrics {
             "running",
             "gauge",
             "Frames that are being solved.",
-            &one(self.running()),
+            &one(running as u64),
         );
         add(
             "workers",

@@ -1,12 +1,14 @@
 //! `serve`: an HTTP server with the protocol of nova.astrometry.net, and one of its own.
 //!
-//! Requests are answered on one thread (`listen`, `routes`): what they bring is limited while it is read (`body`).
+//! Requests are answered on one thread (`listen`, `routes`): pages of other sites are refused (`hosts`), what
+//! requests bring is limited while it is read (`body`), and a client that reads nothing is given up (`stream`).
 //! Frames wait in the `queue`, or in the folder of jobs (`store`), and are solved by threads of their own
 //! (`worker`), which make what is wanted of them (`making`).
 
 mod args;
 mod body;
 mod fetch;
+mod hosts;
 mod http;
 mod keys;
 mod listen;
@@ -20,6 +22,7 @@ mod routes;
 mod server;
 mod solve;
 mod store;
+mod stream;
 mod work;
 mod worker;
 
@@ -43,6 +46,8 @@ pub(crate) fn serve(arguments: &ServeArgs) -> Result<CommandOutput, CommandError
         .with_ansi(false)
         .with_target(false)
         .with_max_level(LevelFilter::INFO)
+        // They would be told on the standard error that is closed.
+        .log_internal_errors(false)
         .init();
     let bound = || {
         let listener = TcpListener::bind(arguments.listen)?;

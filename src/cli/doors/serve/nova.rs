@@ -1,61 +1,101 @@
 //! The protocol of nova.astrometry.net. A submission, its job and its picture have one number.
 
-use super::body::{Received, receive};
-use super::http::{TEXT, nova_reply, reply, shown_name, text_of};
+use super::body::{Limits, receive};
+use super::http::{FITS, TEXT, nova_reply, reply, shown_name, text_of};
 use super::refusal::{NovaRefusal, Refusal};
 use super::server::Server;
-use super::store::{Job, JobResult};
-use super::work::{Wanted, Work};
-use super::worker::{WCS, input_of_job, now};
+use super::solve::{blocking, check_queue};
+use super::store::{Job, JobHead, JobResult, JobState, now};
+use super::work::{Source, Wanted, Work};
+use super::worker::WCS;
 use super::{fetch, solve};
+use axum::body::Bytes;
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, header};
 use axum::response::Response;
 use serde_json::{Map, Value, json};
 use starpipe::doors::nova::{JobAnswers, Upload, form};
 use starpipe::report::tables::TableFormat;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::sync::Arc;
+use tokio::sync::OwnedSemaphorePermit;
 use xxhash_rust::xxh3::xxh3_128;
 
 type Answer = Result<Response, NovaRefusal>;
 type Shared = State<Arc<Server>>;
 
-const FITS: &str = "application/fits";
+/// Bytes of the JSON of a call.
+const MAX_JSON_BYTES: usize = 4_000_000;
+/// Bytes of the body of a call that uploads nothing.
+const MAX_CALL_BYTES: usize = 64_000;
 
 /// A call: its arguments, and the file that comes with it.
 struct Call {
     arguments: Map<String, Value>,
-    file: Option<(Option<String>, Received)>,
+    file: Option<(Option<String>, Bytes)>,
+    /// That of the arguments in memory.
+    _place: Option<OwnedSemaphorePermit>,
 }
 
 impl Call {
-    async fn receive(server: &Server, request: Request) -> Result<Self, NovaRefusal> {
+    /// Reads a call of at most `most` bytes.
+    async fn receive(
+        server: &Arc<Server>,
+        request: Request,
+        most: usize,
+    ) -> Result<Self, NovaRefusal> {
         let kind = text_of(request.headers(), header::CONTENT_TYPE).to_owned();
-        let body = receive(&server.limits, request.into_body()).await?;
-        if kind.starts_with("application/json") {
-            let arguments = arguments(&body.bytes)?;
-            return Ok(Self {
-                arguments,
-                file: None,
-            });
-        }
-        let whole = body.bytes.clone();
-        let parts = form::parts(&kind, &whole).map_err(NovaRefusal::of_call)?;
-        let part = |name: &str| parts.iter().find(|part| part.name == name);
-        let Some(stated) = part("request-json") else {
-            return Err(NovaRefusal::of_call("no json"));
+        let most = match form::is_multipart(&kind) {
+            true => most,
+            // An encoded form may have three letters for one.
+            false => most.min(3 * MAX_JSON_BYTES),
         };
-        let file = part("file").filter(|_| form::is_multipart(&kind));
+        let body = receive(&server.limits, request.into_body(), most).await?;
+        let server = Arc::clone(server);
+        blocking(move || Self::parse(&server.limits, &kind, &body)).await
+    }
+
+    /// The call in a body of this kind: JSON alone, or a form.
+    fn parse(limits: &Limits, kind: &str, body: &Bytes) -> Result<Self, NovaRefusal> {
+        if kind.starts_with("application/json") {
+            return Self::new(limits, body, None);
+        }
+        let parts = form::parts(kind, body).map_err(NovaRefusal::of_call)?;
+        let part = |name: &str| parts.iter().find(|part| part.name == name);
+        let stated = part("request-json").ok_or_else(|| NovaRefusal::of_call("no json"))?;
+        let file = part("file").and_then(|file| match file.content {
+            Cow::Borrowed(content) => Some((file.file_name.clone(), body.slice_ref(content))),
+            // An encoded form has no files.
+            Cow::Owned(_) => None,
+        });
+        Self::new(limits, &stated.content, file)
+    }
+
+    fn new(
+        limits: &Limits,
+        json: &[u8],
+        file: Option<(Option<String>, Bytes)>,
+    ) -> Result<Self, NovaRefusal> {
+        if json.len() > MAX_JSON_BYTES {
+            return Err(Refusal::too_large(MAX_JSON_BYTES).into());
+        }
+        let _place = limits.place_of_json(json.len())?;
+        let refused = |_| NovaRefusal::of_call("failed to parse JSON");
         Ok(Self {
-            arguments: arguments(&stated.content)?,
-            file: file.map(|file| (file.file_name.clone(), body.part(&file.content))),
+            arguments: serde_json::from_slice(json).map_err(refused)?,
+            file,
+            _place,
         })
     }
 
     /// The same of a client that has logged in; without its session.
-    async fn of_session(server: &Server, request: Request) -> Result<Self, NovaRefusal> {
-        let mut call = Self::receive(server, request).await?;
+    async fn of_session(
+        server: &Arc<Server>,
+        request: Request,
+        most: usize,
+    ) -> Result<Self, NovaRefusal> {
+        let mut call = Self::receive(server, request, most).await?;
         let session = call.arguments.remove("session");
         let Some(session) = session.as_ref().and_then(Value::as_str) else {
             return Err(NovaRefusal::of_call("no \"session\" in JSON."));
@@ -66,17 +106,16 @@ impl Call {
         }
         Ok(call)
     }
-}
 
-fn arguments(json: &[u8]) -> Result<Map<String, Value>, NovaRefusal> {
-    let refused = |_| NovaRefusal::of_call("failed to parse JSON");
-    serde_json::from_slice(json).map_err(refused)
+    fn argument(&self, name: &str) -> Option<&str> {
+        self.arguments.get(name).and_then(Value::as_str)
+    }
 }
 
 /// `/api/login`
 pub(super) async fn login(State(server): Shared, request: Request) -> Answer {
-    let call = Call::receive(&server, request).await?;
-    let key = call.arguments.get("apikey").and_then(Value::as_str);
+    let call = Call::receive(&server, request, MAX_CALL_BYTES).await?;
+    let key = call.argument("apikey");
     let key = key.ok_or_else(|| NovaRefusal::of_call("need \"apikey\""))?;
     let session = server.keys.session(key.trim());
     let session = session.ok_or_else(|| NovaRefusal::of_call("bad apikey"))?;
@@ -90,22 +129,20 @@ pub(super) async fn login(State(server): Shared, request: Request) -> Answer {
 /// `/api/upload`
 pub(super) async fn upload(State(server): Shared, request: Request) -> Answer {
     check_queue(&server)?;
-    let call = Call::of_session(&server, request).await?;
-    let (name, content) = match call.file {
+    let mut call = Call::of_session(&server, request, server.limits.max_bytes).await?;
+    let (name, content) = match call.file.take() {
         Some((name, content)) => (shown_name(name.as_deref()), content),
-        None => ("json-xy".to_owned(), Received::kept(Vec::new())),
+        None => ("json-xy".to_owned(), Bytes::new()),
     };
-    submit(&server, name, call.arguments, content).await
+    submit(&server, name, call, content).await
 }
 
 /// `/api/url_upload`; lists of stars are sent here, too.
 pub(super) async fn url_upload(State(server): Shared, request: Request) -> Answer {
     check_queue(&server)?;
-    let call = Call::of_session(&server, request).await?;
-    let stated = call.arguments.get("url").and_then(Value::as_str);
-    let Some(url) = stated.map(str::to_owned) else {
-        let content = Received::kept(Vec::new());
-        return submit(&server, "json-xy".to_owned(), call.arguments, content).await;
+    let call = Call::of_session(&server, request, server.limits.max_bytes).await?;
+    let Some(url) = call.argument("url").map(str::to_owned) else {
+        return submit(&server, "json-xy".to_owned(), call, Bytes::new()).await;
     };
     if !server.allows_url {
         let message = "this server fetches no addresses; upload the file (or start the server with --allow-url)";
@@ -113,45 +150,34 @@ pub(super) async fn url_upload(State(server): Shared, request: Request) -> Answe
     }
     let content = fetch::fetch(&server.limits, &url).await?;
     let path = url.split(['?', '#']).next();
-    submit(&server, shown_name(path), call.arguments, content).await
+    submit(&server, shown_name(path), call, content).await
 }
 
-fn check_queue(server: &Server) -> Result<(), Refusal> {
-    // It is taken once the body is there: slow clients keep no places.
-    server.queue.place().map(drop).ok_or_else(solve::no_place)
-}
-
-async fn submit(
-    server: &Arc<Server>,
-    name: String,
-    settings: Map<String, Value>,
-    content: Received,
-) -> Answer {
-    let upload = Upload::from_json(&settings).map_err(NovaRefusal::of_call)?;
-    if content.bytes.is_empty() && !upload.has_list() {
-        return Err(NovaRefusal::of_call(
-            "no file, no \"url\", and no \"x\" and \"y\"",
-        ));
-    }
-    let hash = format!("{:032x}", xxh3_128(&content.bytes));
+async fn submit(server: &Arc<Server>, name: String, call: Call, content: Bytes) -> Answer {
     let received = now();
-    let job = Job {
-        name,
-        settings,
-        received,
-    };
     let shared = Arc::clone(server);
-    let number = solve::blocking(move || {
+    let submitted = blocking(move || {
+        let upload = Upload::from_json(&call.arguments).map_err(NovaRefusal::of_call)?;
+        if content.is_empty() && !upload.has_list() {
+            let message = "no file, no \"url\", and no \"x\" and \"y\"";
+            return Err(NovaRefusal::of_call(message));
+        }
+        let hash = format!("{:032x}", xxh3_128(&content));
+        let job = Job {
+            name,
+            settings: call.arguments,
+            received,
+        };
         let place = shared.queue.place().ok_or_else(solve::no_place)?;
-        let added = shared.store.add(&job, &content.bytes);
+        let added = shared.store.add(&job, &content);
         let number = added.map_err(|error| {
             tracing::error!("{error:#}");
             Refusal::busy("the folder of jobs is full or cannot be written")
         })?;
         place.fill(Work::Job(number));
-        Ok(number)
-    })
-    .await?;
+        Ok((number, hash))
+    });
+    let (number, hash) = submitted.await?;
     tracing::info!(job = number, "uploaded");
     Ok(nova_reply(
         &json!({"status": "success", "subid": number, "hash": hash}),
@@ -160,16 +186,16 @@ async fn submit(
 
 /// `/api/myjobs`: those of all clients.
 pub(super) async fn my_jobs(State(server): Shared, request: Request) -> Answer {
-    Call::of_session(&server, request).await?;
+    Call::of_session(&server, request, MAX_CALL_BYTES).await?;
     let jobs = server.store.numbers();
     Ok(nova_reply(&json!({"status": "success", "jobs": jobs})))
 }
 
 /// `/api/submission_images`
 pub(super) async fn submission_images(State(server): Shared, request: Request) -> Answer {
-    let call = Call::of_session(&server, request).await?;
+    let call = Call::of_session(&server, request, MAX_CALL_BYTES).await?;
     let number = call.arguments.get("subid").and_then(Value::as_u64);
-    let known = number.filter(|number| server.store.is_done(*number).is_some());
+    let known = number.filter(|number| server.store.state(*number).is_some());
     let known = known.ok_or_else(|| NovaRefusal::of_call("submission does not exist"))?;
     Ok(nova_reply(
         &json!({"status": "success", "image_ids": [known]}),
@@ -178,8 +204,8 @@ pub(super) async fn submission_images(State(server): Shared, request: Request) -
 
 /// `/api/submissions/ID`
 pub(super) async fn submission(State(server): Shared, Path(id): Path<String>) -> Answer {
-    let number = number_of(&server, &id)?;
-    let (job, result) = kept(&server, number)?;
+    let (number, _) = found(&server, &id)?;
+    let (job, result) = kept(&server, number).await?;
     let calibration = result
         .as_ref()
         .and_then(|result| result.answers.calibration);
@@ -202,8 +228,8 @@ pub(super) async fn submission(State(server): Shared, Path(id): Path<String>) ->
 
 /// `/api/jobs/ID`
 pub(super) async fn job(State(server): Shared, Path(id): Path<String>) -> Answer {
-    let (_, result) = kept(&server, number_of(&server, &id)?)?;
-    Ok(nova_reply(&json!({"status": status(result.as_ref())})))
+    let (_, state) = found(&server, &id)?;
+    Ok(nova_reply(&json!({"status": state.word()})))
 }
 
 /// `/api/jobs/ID/calibration` and so on.
@@ -211,9 +237,9 @@ pub(super) async fn job_answer(
     State(server): Shared,
     Path((id, what)): Path<(String, String)>,
 ) -> Answer {
-    let number = number_of(&server, &id)?;
-    let (job, result) = kept(&server, number)?;
-    let state = status(result.as_ref());
+    let (number, _) = found(&server, &id)?;
+    let (job, result) = kept(&server, number).await?;
+    let state = JobState::of(result.as_ref());
     let answers = result.map_or_else(JobAnswers::default, |result| result.answers);
     let no_calibration =
         || json!({"error": format!("no calibration data available for job {number}")});
@@ -226,13 +252,13 @@ pub(super) async fn job_answer(
         "annotations" => json!({"annotations": answers.annotations}),
         "objects_in_field" => json!({"objects_in_field": answers.names()}),
         "tags" | "machine_tags" => json!({"tags": answers.names()}),
-        "info" => info(&job, &answers, state),
+        "info" => info(&job, &answers, state.word()),
         _ => return Err(Refusal::unknown("such address").into()),
     };
     Ok(nova_reply(&answer))
 }
 
-fn info(job: &Job, answers: &JobAnswers, status: &str) -> Value {
+fn info(job: &JobHead, answers: &JobAnswers, status: &str) -> Value {
     let names = answers.names();
     let mut info = json!({
         "status": status,
@@ -251,18 +277,11 @@ fn info(job: &Job, answers: &JobAnswers, status: &str) -> Value {
     info
 }
 
-fn status(result: Option<&JobResult>) -> &'static str {
-    match result {
-        None => "solving",
-        Some(result) if result.answers.calibration.is_some() => "success",
-        Some(_) => "failure",
-    }
-}
-
 /// `/joblog/ID`
 pub(super) async fn job_log(State(server): Shared, Path(id): Path<String>) -> Answer {
-    let (job, result) = kept(&server, number_of(&server, &id)?)?;
-    let state = status(result.as_ref());
+    let (number, _) = found(&server, &id)?;
+    let (job, result) = kept(&server, number).await?;
+    let state = JobState::of(result.as_ref()).word();
     let mut text = format!("{}: {state}\n", job.name);
     if let Some(JobResult { answers, .. }) = result {
         let notes = answers.notes.iter().map(|note| &note.text);
@@ -302,45 +321,50 @@ pub(super) async fn new_fits_file(State(server): Shared, Path(id): Path<String>)
 
 /// `/annotated_display/ID`
 pub(super) async fn annotated(State(server): Shared, Path(id): Path<String>) -> Answer {
-    let picture = made(&server, &id, Wanted::Annotated, "annotated.jpg").await?;
-    Ok(reply("image/jpeg", picture))
+    picture(&server, &id, Wanted::Annotated, "annotated.jpg").await
 }
 
 /// `/extraction_image_display/ID` and `/red_green_image_display/ID`
 pub(super) async fn detections(State(server): Shared, Path(id): Path<String>) -> Answer {
-    let picture = made(&server, &id, Wanted::Detections, "detections.png").await?;
-    Ok(reply("image/png", picture))
+    picture(&server, &id, Wanted::Detections, "detections.png").await
 }
 
 /// A file that was written when the job was done.
 async fn file(server: &Arc<Server>, id: &str, kept: &'static str, name: &'static str) -> Answer {
-    let number = number_of(server, id)?;
+    let (number, _) = found(server, id)?;
     let content = read(server, number, kept).await?;
     let content = content.ok_or_else(|| Refusal::unknown(format_args!("{name} of this job")))?;
     Ok(attached(content, name))
 }
 
-/// A file that is made of the upload when it is wanted first.
+/// A picture with marks.
+async fn picture(server: &Arc<Server>, id: &str, wanted: Wanted, name: &'static str) -> Answer {
+    let picture = made(server, id, wanted, name).await?;
+    Ok(reply(wanted.kind(), picture))
+}
+
+/// A file that is made of the upload when it is wanted first, and kept as `name`.
 async fn made(
     server: &Arc<Server>,
     id: &str,
     wanted: Wanted,
     name: &'static str,
-) -> Result<Vec<u8>, Refusal> {
-    let number = number_of(server, id)?;
-    if server.store.is_done(number) == Some(false) {
+) -> Result<Bytes, Refusal> {
+    let (number, state) = found(server, id)?;
+    if state == JobState::Solving {
         return Err(Refusal::unknown("result of this job yet"));
     }
     if let Some(content) = read(server, number, name).await? {
         return Ok(content);
     }
+    let (_, result) = kept(server, number).await?;
+    let has_none = result.is_none_or(|result| result.has_no_picture);
+    if has_none || (wanted == Wanted::SolvedCopy && state == JobState::Failure) {
+        return Err(Refusal::unknown(format_args!("{name} of this job")));
+    }
+    let content = solve::answered(server, Source::Job(number), wanted).await?;
     let shared = Arc::clone(server);
-    let input = solve::blocking(move || {
-        input_of_job(&shared, number).map_err(|error| Refusal::internal(&error))
-    });
-    let content = solve::answered(server, input.await?, wanted).await?;
-    let shared = Arc::clone(server);
-    solve::blocking(move || {
+    blocking(move || {
         if let Err(error) = shared.store.put(number, name, &content) {
             tracing::error!("{error:#}");
         }
@@ -353,16 +377,17 @@ async fn read(
     server: &Arc<Server>,
     number: u64,
     name: &'static str,
-) -> Result<Option<Vec<u8>>, Refusal> {
+) -> Result<Option<Bytes>, Refusal> {
     let server = Arc::clone(server);
-    solve::blocking(move || {
-        let content = server.store.file(number, name);
-        content.map_err(|error| Refusal::internal(&error))
+    blocking(move || {
+        let file = server.store.file(number, name);
+        let file = file.map_err(|error| server.unreadable(number, &error))?;
+        file.map(|file| server.limits.file(file)).transpose()
     })
     .await
 }
 
-fn attached(content: Vec<u8>, name: &str) -> Response {
+fn attached(content: Bytes, name: &str) -> Response {
     let mut response = reply(FITS, content);
     if let Ok(value) = HeaderValue::try_from(format!("attachment; filename={name}")) {
         response
@@ -372,14 +397,18 @@ fn attached(content: Vec<u8>, name: &str) -> Response {
     response
 }
 
-/// The number of a job that is there.
-fn number_of(server: &Server, id: &str) -> Result<u64, Refusal> {
+/// The number of a job that is there, and how far it is.
+fn found(server: &Server, id: &str) -> Result<(u64, JobState), Refusal> {
     let number = id.parse().ok();
-    let known = number.filter(|number| server.store.is_done(*number).is_some());
-    known.ok_or_else(|| Refusal::unknown("such job"))
+    let found = number.and_then(|number| Some((number, server.store.state(number)?)));
+    found.ok_or_else(|| Refusal::unknown("such job"))
 }
 
-fn kept(server: &Server, number: u64) -> Result<(Job, Option<JobResult>), Refusal> {
-    let read = || anyhow::Ok((server.store.job(number)?, server.store.result(number)?));
-    read().map_err(|error| Refusal::internal(&error))
+async fn kept(server: &Arc<Server>, number: u64) -> Result<(JobHead, Option<JobResult>), Refusal> {
+    let server = Arc::clone(server);
+    blocking(move || {
+        let read = || anyhow::Ok((server.store.job(number)?, server.store.result(number)?));
+        read().map_err(|error| server.unreadable(number, &error))
+    })
+    .await
 }

@@ -15,6 +15,8 @@ struct State<T> {
     waiting: VecDeque<T>,
     /// Places of work that is still being prepared.
     reserved: usize,
+    /// What was taken, and is not done.
+    running: usize,
     is_closed: bool,
 }
 
@@ -30,6 +32,7 @@ impl<T> Queue<T> {
             state: Mutex::new(State {
                 waiting: VecDeque::new(),
                 reserved: 0,
+                running: 0,
                 is_closed: false,
             }),
             changed: Condvar::new(),
@@ -53,7 +56,7 @@ impl<T> Queue<T> {
         self.changed.notify_one();
     }
 
-    /// Waits for work; `None` once the queue is closed.
+    /// Waits for work, which runs until [`done`](Self::done); `None` once the queue is closed.
     pub(super) fn take(&self) -> Option<T> {
         let mut state = self.lock();
         loop {
@@ -61,11 +64,22 @@ impl<T> Queue<T> {
                 return None;
             }
             if let Some(work) = state.waiting.pop_front() {
+                state.running += 1;
                 return Some(work);
             }
             let changed = self.changed.wait(state);
             state = changed.unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    /// What was taken is done.
+    pub(super) fn done(&self) {
+        self.lock().running -= 1;
+    }
+
+    /// How much work runs.
+    pub(super) fn running(&self) -> usize {
+        self.lock().running
     }
 
     /// How much work waits.
@@ -129,6 +143,9 @@ mod tests {
         first.fill(1);
         assert!(queue.place().is_none());
         assert_eq!((queue.take(), queue.len()), (Some(2), 1));
+        assert_eq!(queue.running(), 1);
+        queue.done();
+        assert_eq!(queue.running(), 0);
         assert!(queue.place().is_some());
         queue.push_again(3);
         queue.close();

@@ -1,5 +1,6 @@
 //! Why a request is refused, as its client reads it.
 
+use super::http::{JSON, TEXT};
 use crate::cli::output::messages::one_line;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -36,8 +37,18 @@ impl Refusal {
         Self::new(StatusCode::NOT_FOUND, format_args!("there is no {what}"))
     }
 
+    pub(super) fn too_large(most_bytes: usize) -> Self {
+        let most_kb = most_bytes / 1000;
+        let message = format!("the body is too large: at most {most_kb} kB are accepted");
+        Self::new(StatusCode::PAYLOAD_TOO_LARGE, message)
+    }
+
     pub(super) fn busy(message: &str) -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, message)
+    }
+
+    pub(super) fn ending() -> Self {
+        Self::busy("the server is ending")
     }
 
     /// Something failed that the client cannot help.
@@ -50,11 +61,15 @@ impl Refusal {
     /// Why a frame cannot be solved.
     pub(super) fn of_frame(error: &anyhow::Error) -> Self {
         let see = OptionNames::Words.see(&remedies_of(error.as_ref()));
-        Self::new(status_of(error), one_line(error.as_ref()) + &see)
+        let (status, message) = (status_of(error), one_line(error.as_ref()));
+        if status == StatusCode::INTERNAL_SERVER_ERROR {
+            tracing::error!("{message}");
+        }
+        Self::new(status, message + &see)
     }
 
     fn response(&self, body: &serde_json::Value) -> Response {
-        let kind = [(header::CONTENT_TYPE, "application/json")];
+        let kind = [(header::CONTENT_TYPE, JSON)];
         let mut response = (self.status, kind, body.to_string()).into_response();
         if self.status == StatusCode::SERVICE_UNAVAILABLE {
             let retry = header::HeaderValue::from_static(RETRY_S);
@@ -90,7 +105,7 @@ impl IntoResponse for NovaRefusal {
     fn into_response(self) -> Response {
         let body = json!({"status": "error", "errormessage": self.0.message});
         let mut response = self.0.response(&body);
-        let kind = header::HeaderValue::from_static(super::http::NOVA_JSON);
+        let kind = header::HeaderValue::from_static(TEXT);
         response.headers_mut().insert(header::CONTENT_TYPE, kind);
         response
     }

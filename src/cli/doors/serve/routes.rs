@@ -1,14 +1,16 @@
 //! Which address answers what, and what all answers have.
 
+use super::body::SharedBody;
 use super::http::{JSON, TEXT, reply};
 use super::page::OPENAPI;
 use super::refusal::Refusal;
 use super::server::Server;
 use super::{nova, solve};
 use axum::Router;
+use axum::body::{Body, HttpBody};
 use axum::extract::{Request, State};
 use axum::http::uri::{PathAndQuery, Uri};
-use axum::http::{HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
@@ -26,7 +28,8 @@ const SIGN: header::HeaderName = header::HeaderName::from_static("starpipe");
 const HEADERS: [(header::HeaderName, &str); 5] = [
     (header::CONTENT_SECURITY_POLICY, POLICY),
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-    (header::REFERRER_POLICY, "no-referrer"),
+    // Without one, the form of this server has no origin either.
+    (header::REFERRER_POLICY, "same-origin"),
     (header::CACHE_CONTROL, "no-store"),
     (SIGN, "serve"),
 ];
@@ -77,8 +80,9 @@ pub(super) fn router(server: Arc<Server>) -> Router {
 }
 
 async fn metrics(State(server): State<Arc<Server>>) -> Response {
-    let (waiting, kept_bytes) = (server.queue.len(), server.store.bytes());
-    reply(TEXT, server.metrics.text(waiting, kept_bytes))
+    let (waiting, running) = (server.queue.len(), server.queue.running());
+    let text = server.metrics.text(waiting, running, server.store.bytes());
+    reply(TEXT, text)
 }
 
 /// A file of the page.
@@ -93,20 +97,24 @@ async fn file(State(server): State<Arc<Server>>, request: Request) -> Result<Res
     .await
 }
 
-/// What is done for each request: its address is tidied, a foreign page is refused, and its answer is logged.
-async fn around(State(server): State<Arc<Server>>, mut request: Request, next: Next) -> Response {
+/// What is done for each request: its address is tidied, a foreign page is refused, the rest of its body is read,
+/// and its answer is logged.
+async fn around(State(server): State<Arc<Server>>, request: Request, next: Next) -> Response {
     let begun = Instant::now();
-    *request.uri_mut() = tidied(request.uri());
-    let method = request.method().clone();
-    let path = request.uri().path().to_owned();
-    let site = request.headers().get("sec-fetch-site");
-    let is_foreign = site.is_some_and(|site| site == "cross-site") && method == Method::POST;
-    let mut response = if is_foreign {
-        let message = "pages of other sites may not use this server";
-        Refusal::new(StatusCode::FORBIDDEN, message).into_response()
-    } else {
-        next.run(request).await
+    let (mut head, body) = request.into_parts();
+    head.uri = tidied(&head.uri);
+    let (method, path) = (head.method.clone(), head.uri.path().to_owned());
+    // Such a client sends no body before it is asked for it.
+    let waits = head.headers.contains_key(header::EXPECT);
+    let body = SharedBody::new(body);
+    let request = Request::from_parts(head, Body::new(body.clone()));
+    let mut response = match server.hosts.check(&method, request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
     };
+    if !waits && !body.is_end_stream() {
+        body.drain().await;
+    }
     for (name, value) in HEADERS {
         let value = HeaderValue::from_static(value);
         response.headers_mut().entry(name).or_insert(value);

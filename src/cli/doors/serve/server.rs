@@ -2,10 +2,12 @@
 
 use super::args::ServeArgs;
 use super::body::Limits;
+use super::hosts::Hosts;
 use super::keys::Keys;
 use super::metrics::Metrics;
 use super::page::Page;
 use super::queue::Queue;
+use super::refusal::Refusal;
 use super::store::Store;
 use super::work::Work;
 use crate::cli::exit::CommandError;
@@ -21,6 +23,7 @@ pub(super) struct Server {
     pub(super) options: SolveOptions,
     pub(super) limits: Limits,
     pub(super) allows_url: bool,
+    pub(super) hosts: Hosts,
     pub(super) keys: Keys,
     pub(super) page: Page,
     pub(super) store: Store,
@@ -40,6 +43,7 @@ impl Server {
                 Duration::from_secs(arguments.send_time),
             ),
             allows_url: arguments.allow_url,
+            hosts: Hosts::new(arguments.listen, arguments.host.clone()),
             keys: arguments
                 .keys
                 .as_deref()
@@ -58,6 +62,14 @@ impl Server {
             server.queue.push_again(Work::Job(number));
         }
         Ok(server)
+    }
+
+    /// Why a file of a job cannot be read: it may have been removed since the client asked.
+    pub(super) fn unreadable(&self, number: u64, error: &anyhow::Error) -> Refusal {
+        match self.store.state(number) {
+            None => Refusal::unknown("such job"),
+            Some(_) => Refusal::internal(error),
+        }
     }
 
     /// Ends running jobs as soon as they notice.

@@ -4,9 +4,10 @@ use super::body::receive;
 use super::http::{reply, shown_name, text_of};
 use super::refusal::Refusal;
 use super::server::Server;
-use super::work::{Input, Request as Asked, Wanted, Work};
+use super::work::{Input, Request as Asked, Source, Wanted, Work};
+use axum::body::Bytes;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::Response;
 use starpipe::doors::nova::form::{self, Part};
 use starpipe::solve::SolveOptions;
@@ -17,28 +18,33 @@ use std::time::Duration;
 use tokio::sync::oneshot;
 
 /// How long a client may wait for its turn and its answer.
-const MAX_WAIT: Duration = Duration::from_secs(600);
+pub(super) const MAX_WAIT: Duration = Duration::from_secs(600);
+
+/// What the page of `answer=html` may do: its style, its program and its picture are within it.
+const POLICY: HeaderValue = HeaderValue::from_static(
+    "sandbox allow-scripts; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
+     img-src data:",
+);
 
 /// `POST /solve`
 pub(super) async fn solve(
     State(server): State<Arc<Server>>,
     request: Request,
 ) -> Result<Response, Refusal> {
-    server.queue.place().map(drop).ok_or_else(no_place)?;
+    check_queue(&server)?;
     let query = form::fields(request.uri().query().unwrap_or_default().as_bytes());
     let mut stated = Stated::default();
     stated.add_all(&query);
     check_key(&server, request.headers(), &stated)?;
     let kind = text_of(request.headers(), header::CONTENT_TYPE).to_owned();
-    let body = receive(&server.limits, request.into_body()).await?;
+    let body = receive(&server.limits, request.into_body(), server.limits.max_bytes).await?;
     let content = if form::is_multipart(&kind) {
-        let whole = body.bytes.clone();
-        let parts = form::parts(&kind, &whole).map_err(Refusal::invalid)?;
+        let parts = form::parts(&kind, &body).map_err(Refusal::invalid)?;
         stated.add_all(&parts);
         let file = parts.iter().find(|part| part.file_name.is_some());
         let file = file.ok_or_else(|| Refusal::invalid("the form has no file"))?;
         stated.name = stated.name.or_else(|| file.file_name.clone());
-        body.part(&file.content)
+        body.slice_ref(&file.content)
     } else {
         body
     };
@@ -50,8 +56,13 @@ pub(super) async fn solve(
         page: stated.page()?,
         upload: None,
     };
-    let made = answered(&server, input, wanted).await?;
-    Ok(reply(wanted.kind(), made))
+    let made = answered(&server, Source::Given(Box::new(input)), wanted).await?;
+    let mut response = reply(wanted.kind(), made);
+    if wanted == Wanted::Html {
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_SECURITY_POLICY, POLICY);
+    }
+    Ok(response)
 }
 
 /// What a request states.
@@ -118,6 +129,11 @@ fn check_key(server: &Server, headers: &HeaderMap, stated: &Stated) -> Result<()
     Err(Refusal::new(StatusCode::UNAUTHORIZED, message))
 }
 
+/// Refuses where the queue is full. A place is taken once the body is there: slow clients keep none.
+pub(super) fn check_queue(server: &Server) -> Result<(), Refusal> {
+    server.queue.place().map(drop).ok_or_else(no_place)
+}
+
 /// The queue has no place.
 pub(super) fn no_place() -> Refusal {
     Refusal::busy("the queue is full; ask again later")
@@ -126,20 +142,20 @@ pub(super) fn no_place() -> Refusal {
 /// Waits until a worker has made what is wanted of a frame.
 pub(super) async fn answered(
     server: &Server,
-    input: Input,
+    source: Source,
     wanted: Wanted,
-) -> Result<Vec<u8>, Refusal> {
+) -> Result<Bytes, Refusal> {
     let place = server.queue.place().ok_or_else(no_place)?;
     let (answer, answered) = oneshot::channel();
     let request = Asked {
-        input,
+        source,
         wanted,
         answer,
     };
-    place.fill(Work::Request(Box::new(request)));
+    place.fill(Work::Request(request));
     match tokio::time::timeout(MAX_WAIT, answered).await {
         Ok(Ok(made)) => made,
-        Ok(Err(_)) => Err(Refusal::busy("the server is ending")),
+        Ok(Err(_)) => Err(Refusal::ending()),
         Err(_) => {
             let message = "the answer takes too long";
             Err(Refusal::new(StatusCode::GATEWAY_TIMEOUT, message))
@@ -148,9 +164,9 @@ pub(super) async fn answered(
 }
 
 /// Does work that reads or writes files, beside the answering of requests.
-pub(super) async fn blocking<R: Send + 'static>(
-    work: impl FnOnce() -> Result<R, Refusal> + Send + 'static,
-) -> Result<R, Refusal> {
+pub(super) async fn blocking<R: Send + 'static, E: From<Refusal> + Send + 'static>(
+    work: impl FnOnce() -> Result<R, E> + Send + 'static,
+) -> Result<R, E> {
     let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|error| Err(Refusal::internal(&error.into())))
+    done.unwrap_or_else(|error| Err(Refusal::internal(&error.into()).into()))
 }

@@ -1,7 +1,7 @@
 //! What waits for a worker.
 
-use super::body::Received;
 use super::refusal::Refusal;
+use axum::body::Bytes;
 use starpipe::doors::nova::Upload;
 use starpipe::report::overlay::{Rings, SkyLayers};
 use starpipe::solve::SolveOptions;
@@ -13,20 +13,28 @@ pub(super) enum Work {
     /// A job of the store.
     Job(u64),
     /// A request whose client waits.
-    Request(Box<Request>),
+    Request(Request),
 }
 
 /// A frame, and what its client wants of it.
 pub(super) struct Request {
-    pub(super) input: Input,
+    pub(super) source: Source,
     pub(super) wanted: Wanted,
-    pub(super) answer: oneshot::Sender<Result<Vec<u8>, Refusal>>,
+    pub(super) answer: oneshot::Sender<Result<Bytes, Refusal>>,
+}
+
+/// Where a frame comes from.
+pub(super) enum Source {
+    /// The request.
+    Given(Box<Input>),
+    /// The upload of this job, which the worker reads: what waits needs no memory.
+    Job(u64),
 }
 
 /// A frame, or a list of stars, and what is stated for it.
 pub(super) struct Input {
     pub(super) name: String,
-    pub(super) content: Received,
+    pub(super) content: Bytes,
     pub(super) options: SolveOptions,
     /// Which image of a file with several, from 1; by default the main one.
     pub(super) page: Option<NonZeroUsize>,
