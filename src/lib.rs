@@ -43,6 +43,7 @@
 //! |---|---|
 //! | `base` | what numbers mean: units, directions, dates, statistics |
 //! | [`catalog`] | which stars there are |
+//! | `flight` | what does a flight computer read: stars and triangles in one block of bytes, and what that costs |
 //! | [`ephemeris`] | from where and when one looks: observer, places of stars, Moon and planets |
 //! | [`frame`] | what a file holds: readers, writers, metadata |
 //! | [`camera`] | what instrument: geometry, data sheet, lenses in files of other programs |
@@ -84,6 +85,8 @@ pub mod detect;
 #[doc(hidden)]
 pub mod doors;
 pub mod ephemeris;
+#[doc(hidden)]
+pub mod flight;
 pub mod frame;
 pub mod identify;
 pub mod lab;

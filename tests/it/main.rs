@@ -25,6 +25,7 @@ mod doors;
 mod experiment;
 mod faults;
 mod fixtures;
+mod flight;
 mod folders;
 mod frames;
 mod fuzz_replay;

@@ -1,10 +1,13 @@
 //! `catalog`: converts star catalogues, tells what they have, and which ones a field needs.
 
-use super::exit::{CommandError, CommandOutput};
-use super::options::values;
-use super::output::overwrite::is_same_file;
+mod export;
+
+use crate::cli::exit::{CommandError, CommandOutput};
+use crate::cli::options::values;
+use crate::cli::output::overwrite::is_same_file;
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
+use export::ExportArgs;
 use starpipe::base::format::counted;
 use starpipe::catalog::deep::{DeepCatalog, DeepContents, installed_paths, narrowest_fov_deg};
 use starpipe::catalog::{self, Catalog, SourceFile};
@@ -22,6 +25,9 @@ enum CatalogCommand {
     /// Convert a catalog from its published form into the compact form that --catalog loads
     /// fastest
     Import(ImportArgs),
+    /// Write stars and triangles for a flight computer, as starpipe-flight and its C interface read them in
+    /// place
+    Export(ExportArgs),
     /// Tell what a catalog has: stars, depth, epoch, and the narrowest field it is enough for
     Info(InfoArgs),
     /// Tell which catalogs have enough stars for a field of view, and where to get them
@@ -71,6 +77,7 @@ struct ImportArgs {
 pub(crate) fn catalog(arguments: CatalogArgs) -> Result<CommandOutput, CommandError> {
     match arguments.command {
         CatalogCommand::Import(arguments) => import(&arguments),
+        CatalogCommand::Export(arguments) => export::export(&arguments),
         CatalogCommand::Info(arguments) => info(&arguments),
         CatalogCommand::Recommend(arguments) => {
             Ok(CommandOutput::success(recommend(arguments.fov)))

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 const ROOMS: &[(&str, &[&str])] = &[
     ("base", &[]),
     ("catalog", &["base"]),
+    ("flight", &["base", "catalog"]),
     ("ephemeris", &["base", "catalog"]),
     ("frame", &["base", "ephemeris"]),
     ("camera", &["base", "ephemeris"]),
