@@ -265,7 +265,7 @@ impl<'a> Catalog<'a> {
 
 /// The class of a longest side.
 pub(crate) fn class_of(longest: u16) -> usize {
-    usize::from(longest) * CLASSES >> 16
+    (usize::from(longest) * CLASSES) >> 16
 }
 
 /// The first number in `from..end` for which `is_before` does not hold.

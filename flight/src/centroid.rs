@@ -75,7 +75,7 @@ pub(crate) fn peak(image: &Image, [x, y]: [f64; 2], radius_px: f64) -> Option<[f
     let inner = |at: f64, side: usize| {
         let first = libm::ceil(at - radius_px).max(1.0);
         let last = libm::floor(at + radius_px).min(side as f64 - 2.0);
-        (first <= last).then(|| first as usize..=last as usize)
+        (first <= last).then_some(first as usize..=last as usize)
     };
     let (columns, rows) = inner(x, image.width()).zip(inner(y, image.height()))?;
     let mut best = None;
@@ -163,8 +163,8 @@ fn sums(window: &Window, config: &Config, [x, y]: [f64; 2]) -> Sums {
         sums.light += weight * light;
         sums.weight_squared += weight * weight;
         sums.noise += weight * weight * variance;
-        for axis in 0..2 {
-            let lever = weight * offset[axis];
+        for (axis, offset) in offset.iter().enumerate() {
+            let lever = weight * offset;
             sums.moment[axis] += lever * light;
             sums.square[axis] += lever * lever * variance;
         }

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// The options that `-h` shows, by command, in lists that several share; of commands that are not here, it
 /// shows all.
-const SHOWN: [(&str, [&[&str]; 2]); 15] = [
+const SHOWN: [(&str, [&[&str]; 2]); 16] = [
     ("process", [&["dark", "mask", "draw"], &SOLVING]),
     ("sky", [&["dark", "flat", "mask"], &SOLVING]),
     (
@@ -67,6 +67,20 @@ const SHOWN: [(&str, [&[&str]; 2]); 15] = [
                 "height",
                 "catalog",
             ],
+        ],
+    ),
+    (
+        "serve",
+        [
+            &[
+                "listen",
+                "keys",
+                "page",
+                "folder",
+                "max_upload",
+                "allow_url",
+            ],
+            &["jobs", "catalog", "threads"],
         ],
     ),
     ("limit", [&[], &STUDY]),

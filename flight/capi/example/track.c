@@ -62,5 +62,6 @@ int main(int count, char **arguments) {
         for (int axis = 0; axis < 3; axis++) print_bits(axis ? " " : ", ", attitude.covariance_rad2[axis][axis]);
         printf("\n");
     }
+    fclose(images);
     return 0;
 }

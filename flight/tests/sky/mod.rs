@@ -1,6 +1,10 @@
 //! A sky, and a camera that photographs it: independent of what is tested, star by star and pixel by pixel.
 
 #![allow(dead_code, reason = "each test uses a part of it")]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "tests may differ in the last bit"
+)]
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{Rng, SeedableRng};

@@ -143,7 +143,8 @@ mod tests {
         assert_eq!(bytes("1.5kB"), Ok(1500));
         assert_eq!(bytes("64KiB"), Ok(65_536));
         assert_eq!(bytes("700"), Ok(700));
-        for text in ["", "MB", "2 MB", "2mb", "-1kB", "9999999MB", "1e3"] {
+        assert_eq!(bytes("2 MB"), Ok(2_000_000));
+        for text in ["", "MB", "2mb", "-1kB", "9999999MB", "1e3"] {
             assert!(bytes(text).is_err(), "{text}");
         }
     }

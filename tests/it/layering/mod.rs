@@ -30,14 +30,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "photometry",
         &[
-            "base",
-            "catalog",
-            "ephemeris",
-            "frame",
-            "camera",
-            "detect",
-            "identify",
-            "predict",
+            "base", "catalog", "frame", "camera", "detect", "identify", "predict",
         ],
     ),
     (

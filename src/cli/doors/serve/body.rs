@@ -2,7 +2,6 @@
 //! and the memory of the answers that clients read slowly.
 
 use super::refusal::Refusal;
-use super::solve::MAX_WAIT;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::http::StatusCode;
 use http_body_util::BodyExt;
@@ -15,6 +14,9 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, timeout, timeout_at};
+
+/// How long a client may wait for its turn and its answer.
+pub(super) const MAX_WAIT: Duration = Duration::from_secs(600);
 
 /// Bodies that arrive slower than this are given up.
 const MIN_BYTES_PER_S: u64 = 50_000;

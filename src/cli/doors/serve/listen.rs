@@ -1,8 +1,8 @@
 //! Connections: accepted until a signal comes, limited in number and in time.
 
+use super::body::MAX_WAIT;
 use super::routes;
 use super::server::Server;
-use super::solve::MAX_WAIT;
 use super::stream::Stream;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};

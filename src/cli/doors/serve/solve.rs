@@ -1,6 +1,6 @@
 //! `POST /solve`: a frame in, the JSON of `process` out, or another of its results.
 
-use super::body::receive;
+use super::body::{MAX_WAIT, receive};
 use super::http::{reply, shown_name, text_of};
 use super::refusal::Refusal;
 use super::server::Server;
@@ -14,11 +14,7 @@ use starpipe::solve::SolveOptions;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::sync::oneshot;
-
-/// How long a client may wait for its turn and its answer.
-pub(super) const MAX_WAIT: Duration = Duration::from_secs(600);
 
 /// What the page of `answer=html` may do: its style, its program and its picture are within it.
 const POLICY: HeaderValue = HeaderValue::from_static(
