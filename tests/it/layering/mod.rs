@@ -110,7 +110,10 @@ const ROOMS: &[(&str, &[&str])] = &[
             "track",
         ],
     ),
-    ("doors", &["base", "centroids", "frame", "report", "solve"]),
+    (
+        "doors",
+        &["base", "centroids", "frame", "identify", "report", "solve"],
+    ),
     (
         "night",
         &[
