@@ -1,6 +1,6 @@
 //! What does a flight computer read? The stars and their triangles in one block of bytes, and what that costs.
 //!
-//! [`Catalog`](crate::Catalog) → [`export`] → the bytes that `starpipe-flight` reads in place → [`Trials`]: how often
+//! [`Catalog`](crate::Catalog) → [`export()`] → the bytes that `starpipe-flight` reads in place → [`Trials`]: how often
 //! frames are then identified.
 
 mod export;
