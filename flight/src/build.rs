@@ -103,18 +103,26 @@ pub fn catalog(stars: &[Star], plan: &Plan) -> Result<Vec<u8>, BuildError> {
     let circles = Circles::new(&kept, plan);
     let mut best = None;
     for brightest in 3..=MAX_BRIGHTEST {
-        let triangles = circles.triangles(brightest);
-        let needed_bytes = stars_bytes + triangles.len() * TRIANGLE_BYTES;
+        let triples = circles.triples(brightest);
+        let needed_bytes = stars_bytes + triples.len() * TRIANGLE_BYTES;
         if needed_bytes > plan.budget_bytes {
             if best.is_none() {
                 return Err(BuildError::Budget { needed_bytes });
             }
             break;
         }
-        best = Some(triangles);
+        best = Some(triples);
     }
-    let triangles = best.unwrap_or_default();
-    Ok(bytes(&kept, &triangles, circles.most_in_view, plan))
+    let triples = best.unwrap_or_default();
+    let longest = longest_chord(&kept, &triples);
+    let triangles = triangles(&kept, &triples, longest);
+    Ok(bytes(
+        &kept,
+        &triangles,
+        longest,
+        circles.most_in_view,
+        plan,
+    ))
 }
 
 /// The brightest stars of circles all over the sky.
@@ -173,9 +181,9 @@ impl<'a> Circles<'a> {
         }
     }
 
-    /// All triangles of this many of the brightest stars of each circle, in the order of the catalogue.
-    fn triangles(&self, brightest: usize) -> Vec<Triangle> {
-        let mut all: BTreeSet<[u16; 3]> = BTreeSet::new();
+    /// The stars of all triangles of this many of the brightest stars of each circle.
+    fn triples(&self, brightest: usize) -> BTreeSet<[u16; 3]> {
+        let mut all = BTreeSet::new();
         for circle in &self.brightest {
             let circle = &circle[..circle.len().min(brightest)];
             for third in 2..circle.len() {
@@ -188,27 +196,27 @@ impl<'a> Circles<'a> {
                 }
             }
         }
-        let longest = self.longest_chord(&all);
-        let mut triangles: Vec<Triangle> = all
-            .iter()
-            .map(|stars| triangle(self.stars, *stars, longest))
-            .collect();
-        triangles.sort_by_key(|triangle| {
-            (
-                class_of(triangle.sides[0]),
-                triangle.sides[1],
-                triangle.sides,
-                triangle.stars,
-            )
-        });
-        triangles
+        all
     }
+}
 
-    fn longest_chord(&self, all: &BTreeSet<[u16; 3]>) -> f64 {
-        let chords = all.iter().flat_map(|stars| sides(self.stars, *stars));
-        // What is written is a 32-bit number, and none may be longer.
-        f64::from((chords.map(|(chord, _)| chord).fold(0.0, f64::max) * (1.0 + 1e-6)) as f32)
-    }
+/// The chord of the longest side, and a little more: what is written is a 32-bit number, and no side may be longer.
+fn longest_chord(stars: &[Star], triples: &BTreeSet<[u16; 3]>) -> f32 {
+    let chords = triples.iter().flat_map(|triple| sides(stars, *triple));
+    (chords.map(|(chord, _)| chord).fold(0.0, f64::max) * (1.0 + 1e-6)) as f32
+}
+
+/// The triangles in the order of the catalogue.
+fn triangles(stars: &[Star], triples: &BTreeSet<[u16; 3]>, longest: f32) -> Vec<Triangle> {
+    let made = triples
+        .iter()
+        .map(|triple| triangle(stars, *triple, f64::from(longest)));
+    let mut triangles: Vec<Triangle> = made.collect();
+    triangles.sort_by_key(|triangle| {
+        let Triangle { sides, stars } = *triangle;
+        (class_of(sides[0]), sides[1], sides, stars)
+    });
+    triangles
 }
 
 /// The sides of a triangle, each with the star opposite to it, the longest first.
@@ -258,11 +266,13 @@ fn most_in_view(stars: &[Star], radius: f64) -> usize {
     centers(distance).iter().map(inside).max().unwrap_or(0)
 }
 
-fn bytes(stars: &[Star], triangles: &[Triangle], most_in_view: usize, plan: &Plan) -> Vec<u8> {
-    let chords = triangles
-        .iter()
-        .flat_map(|triangle| sides(stars, triangle.stars));
-    let longest = (chords.map(|(chord, _)| chord).fold(0.0, f64::max) * (1.0 + 1e-6)) as f32;
+fn bytes(
+    stars: &[Star],
+    triangles: &[Triangle],
+    longest: f32,
+    most_in_view: usize,
+    plan: &Plan,
+) -> Vec<u8> {
     let mut content = Vec::new();
     for value in [
         plan.fov_deg[0],

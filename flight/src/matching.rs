@@ -171,7 +171,8 @@ pub(crate) fn pair(
             continue;
         };
         buffers.taken[spot] = 1;
-        let variance_px2 = spots[spot].sigma_px.powi2() + reach.floor_px.powi2();
+        let [sigma, floor] = [spots[spot].sigma_px, reach.floor_px];
+        let variance_px2 = sigma * sigma + floor * floor;
         buffers.matches[pairing.matches] = Match {
             observed: buffers.directions[spot],
             apparent: star.apparent,
@@ -209,15 +210,4 @@ fn nearest(
         }
     }
     best.1
-}
-
-/// Squares, which `core` has not.
-trait Square {
-    fn powi2(self) -> f64;
-}
-
-impl Square for f64 {
-    fn powi2(self) -> f64 {
-        self * self
-    }
 }
